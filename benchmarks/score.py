@@ -38,7 +38,6 @@ SUMMARY_METRICS = (
     "curvature/mean", "curvature/error", "penetration/surface", "distance/rms", "surface/chamfer",
     "surface/normals",
 )  # fmt: skip
-MISSING = "missing"  # status of a roll-out that a run ended before
 EXAMPLES = """examples:
   python -m benchmarks.export tshirt/kick -o kick                 the scene, to be simulated elsewhere
   python -m benchmarks.score mine.npz --scene tshirt/kick -o scored
@@ -99,8 +98,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )  # fmt: skip
     with contextlib.redirect_stdout(sys.stderr):
         status = carry_out(plan, program=PROGRAM, report=not options.json)
-    if status in (0, 1) and RunFolder(plan.folder).rows_path.is_file():
-        print(json.dumps(numbers(plan), indent=1) if options.json else summary(plan))
+    if evaluated := numbers(plan, status):
+        print(json.dumps(evaluated, indent=1) if options.json else summary(evaluated))
     return status
 
 
@@ -131,12 +130,11 @@ def score(
     message = io.StringIO()
     with contextlib.redirect_stdout(sys.stderr), contextlib.redirect_stderr(message):
         status = carry_out(plan, program=PROGRAM, report=False)
-    lines = message.getvalue().strip().splitlines()
     if status == INTERRUPTED:
         raise KeyboardInterrupt
-    evaluated = numbers(plan) if status in (0, 1) and RunFolder(plan.folder).rows_path.is_file() else None
-    if evaluated is None or evaluated["status"] == MISSING:
-        raise ValueError(lines[-1] if lines else "the run ended early")
+    evaluated = numbers(plan, status)
+    if evaluated is None:
+        raise ValueError((message.getvalue().strip() or "the run ended early").splitlines()[-1])
     return evaluated
 
 
@@ -202,36 +200,38 @@ def _reference(cell: Cell, given: str | Path | Literal[False] | None) -> Cell:
     return replace(cell, entry=replace(entry, label="Reference, from a file"))
 
 
-def numbers(plan: Plan) -> dict[str, Any]:
-    """Return what was found of the roll-out, ready for JSON.
+def numbers(plan: Plan, status: int) -> dict[str, Any] | None:
+    """Return what a run found of the roll-out, ready for JSON; None where it ended before.
 
     Returns:
-        name, scene, status ("ok", the first other one, or "missing" where the run ended before), reason,
-        metrics (name -> value and unit), folder.
+        name, scene, status ("ok", or the first other one), reason, metrics (name -> value and unit), folder.
     """
     folder, name = RunFolder(plan.folder), plan.cells[-1].method
+    if status not in (0, 1) or not folder.rows_path.is_file():
+        return None
     rows = [row for row in folder.read_rows() if row.method == name]
-    bad = next((row for row in rows if row.status != "ok"), None)
+    if not rows:
+        return None
+    bad = next((row for row in rows if row.status != "ok"), rows[0])
     known = (row for row in rows if row.value is not None)
     return {
         "name": name,
         "scene": plan.scenes[0].name,
-        "status": bad.status if bad else "ok" if rows else MISSING,
-        "reason": bad.reason if bad else "" if rows else "the run ended before it was evaluated",
+        "status": bad.status,
+        "reason": bad.reason if bad.status != "ok" else "",
         "metrics": {row.metric: {"value": row.value, "unit": row.unit} for row in known},
         "folder": str(plan.folder),
     }
 
 
-def summary(plan: Plan) -> str:
+def summary(evaluated: dict[str, Any]) -> str:
     """Return one line of results, and where the rest is."""
-    result = numbers(plan)
-    known = {name: result["metrics"][name] for name in SUMMARY_METRICS if name in result["metrics"]}
-    shown = [f"{name} {number['value']:.4g} {number['unit']}" for name, number in known.items()]
-    bad = f"{result['status']}: {result['reason']}" if result["status"] != "ok" else ""
-    report = RunFolder(plan.folder).report_path
-    where = report if report.is_file() else plan.folder
-    return f"{result['name']} in {result['scene']}: {', '.join(filter(None, (bad, *shown)))}; {where}"
+    folder, metrics = RunFolder(Path(evaluated["folder"])), evaluated["metrics"]
+    bad = [f"{evaluated['status']}: {evaluated['reason']}"] if evaluated["status"] != "ok" else []
+    shown = {name: metrics[name] for name in SUMMARY_METRICS if name in metrics}
+    values = [f"{name} {number['value']:.4g} {number['unit']}" for name, number in shown.items()]
+    where = folder.report_path if folder.report_path.is_file() else folder.path
+    return f"{evaluated['name']} in {evaluated['scene']}: {', '.join([*bad, *values])}; {where}"
 
 
 if __name__ == "__main__":

@@ -10,9 +10,8 @@ import contextlib
 import math
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
-from itertools import islice
 from pathlib import Path
 
 from benchmarks.external.roll_out_files import RollOutOption
@@ -25,6 +24,7 @@ from benchmarks.results.protocol import DIGEST, NUMBER
 from benchmarks.results.row import USABLE, Row
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.run import carry_out
+from benchmarks.score import MEASURED_BESIDE
 from benchmarks.timing import one_thread
 from reference_sim.command_line import Parser, command
 from snug.motion.library import TEST
@@ -32,24 +32,18 @@ from snug.motion.library import TEST
 PROGRAM = "benchmarks.submit"
 PRESET = find_preset("quick")
 SCENES = tuple(f"tshirt/{motion}" for motion in TEST[: PRESET.test_motions])  # of a full entry
-MEASURED_BESIDE = ("simulation", "skinning")  # of which relative excess is made
 METADATA = "entry.toml"
-SAME = 1e-3  # relative difference of two energies that are one: processors and float32 round otherwise
-ABSOLUTE = 1e-9  # [J] of energies that are nearly 0
 DECLARED = "cost/frame"  # the one cost that an entry has: as its authors say
 KEPT = ("preset", "metrics", "methods", "scenes", "cases")  # of run.json
-SHOWN = 5  # differences that are printed
 EXAMPLES = """examples:
   python -m benchmarks.export tshirt/dance_turn -o dance            a scene, to be dressed elsewhere
   python -m benchmarks.submit check submissions/mine                seconds: metadata, files, protocol
   python -m benchmarks.submit score submissions/mine                minutes: writes submissions/mine/scores
-  python -m benchmarks.submit score submissions/mine --replace      after a change of the entry
   python -m reports.docs                                            writes the page of all entries
 
 DIR has entry.toml and one roll-out for each scene, or a program (docs/entries.md). Both check and score load
-  the program, and score runs it: read the program of somebody else first. Scores that are there are compared
-  with those of now.
-exit status: 0 fine; 1 scores that are not the recorded ones: a line each; 2 a fault of DIR: one line."""
+  the program, and score runs it: read the program of somebody else first.
+exit status: 0 fine; 2 a fault of DIR: one line."""
 
 
 class EntryError(ValueError):
@@ -174,34 +168,24 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("action", choices=("check", "score"), help="check alone, or check and score")
     parser.add_argument("entry", metavar="DIR", help="folder of the entry")
-    parser.add_argument("--replace", action="store_true", help="write the scores whatever was recorded")
     options = parser.parse_args(arguments)
     one_thread()
     entry = read_entry(Path(options.entry))
-    recorded = entry.scores.config_path.is_file() and not options.replace
-    if recorded:
-        check_scores(entry)
     with tempfile.TemporaryDirectory(prefix="entry-") as folder:
         plan = entry.plan(Path(folder) / "run")
         if options.action == "check":
             from benchmarks.runner.execute_plan import check_roll_outs
 
+            check_scores(entry)
             check_roll_outs(plan)
             print(f"{entry.path}: nothing found; {len(entry.scenes)} of {len(SCENES)} scenes")
             return 0
         with contextlib.redirect_stdout(sys.stderr):
             if carry_out(plan, program=PROGRAM, report=False) not in (0, 1):
                 raise EntryError(f"{entry.path}: was not scored: a line above says why")
-        rows, run = scores_of(entry, RunFolder(plan.folder)), RunFolder(plan.folder).read_config()
-    if not recorded:
-        write(entry, rows, {name: run.get(name) for name in KEPT})
-        print(f"{entry.path}: {len(rows)} rows in {entry.scores.rows_path}")
-        return 0
-    lines = list(islice(differences(entry, rows), SHOWN))
-    lines += [f"{entry.path}: " + ("refused: its scores are not the recorded ones" if lines else
-              f"scored again, {len(rows)} rows, energies as recorded")]  # fmt: skip
-    print("\n".join(lines))
-    return int(len(lines) > 1)
+        count = write_scores(entry, RunFolder(plan.folder))
+    print(f"{entry.path}: {count} rows in {entry.scores.rows_path}")
+    return 0
 
 
 def read_entry(path: Path) -> Entry:
@@ -211,7 +195,9 @@ def read_entry(path: Path) -> Entry:
 
 def check_scores(entry: Entry) -> None:
     """Raise ValueError for scores of another protocol, or of files that have changed since."""
-    config, again = entry.scores.read_config(), "score with --replace"
+    if not entry.scores.config_path.is_file():
+        return
+    config, again = entry.scores.read_config(), "score it again"
     if (number := (config.get("protocol") or {}).get("number")) != NUMBER:
         raise EntryError(f"{entry.scores.path}: scores of protocol {number}, this is {NUMBER}: {again}")
     then, now = config.get("entry") or {}, entry.digests()
@@ -246,36 +232,19 @@ def scores_of(entry: Entry, run: RunFolder) -> list[Row]:
     return kept
 
 
-def differences(entry: Entry, now: Sequence[Row]) -> Iterator[str]:
-    """Yield a line for each energy that is not the recorded one.
+def write_scores(entry: Entry, run: RunFolder) -> int:
+    """Write the rows and the digests of all that was scored; return the number of rows.
 
-    Compared are the energies of the entry, and the total energies of simulation and skinning, which give its
-    relative excess. All else hangs on the simulation, which is chaotic: on another kind of processor it parts
-    from the recorded one.
+    The same entry gives the same bytes.
     """
-    before, after = (
-        {
-            (row.method, row.scene, row.seed, row.metric): row.value
-            for row in rows
-            if row.metric == "energy/total" or (row.metric[:7], row.method) == ("energy/", entry.name)
-        }
-        for rows in (entry.scores.read_rows(), now)
-    )
-    for key in dict.fromkeys((*before, *after)):
-        one, other = before.get(key), after.get(key)
-        if one is None or other is None or not math.isclose(one, other, rel_tol=SAME, abs_tol=ABSOLUTE):
-            yield f"{key[0]} in {key[1]}, {key[3]}: {other}, recorded is {one}"
-
-
-def write(entry: Entry, rows: Sequence[Row], config: dict[str, object]) -> None:
-    """Write the scores and the digests of what was scored: the same bytes for the same entry."""
-    folder = entry.scores
+    rows, config, folder = scores_of(entry, run), run.read_config(), entry.scores
     folder.path.mkdir(exist_ok=True)
     folder.write_rows(rows)
     folder.write_config({
-        "protocol": {"number": NUMBER, "digest": DIGEST}, **config,
+        "protocol": {"number": NUMBER, "digest": DIGEST}, **{name: config.get(name) for name in KEPT},
         "metadata": asdict(entry.metadata), "entry": entry.digests(),
     })  # fmt: skip
+    return len(rows)
 
 
 if __name__ == "__main__":

@@ -71,7 +71,7 @@ def of_entry(folder: Path) -> Scored:
     Raises:
         ResultsError: no scores, run.json without the entry's metadata, or scores of another name.
     """
-    scores, again = RunFolder(folder / "scores"), f"run python -m benchmarks.submit score {folder} --replace"
+    scores, again = RunFolder(folder / "scores"), f"run python -m benchmarks.submit score {folder}"
     if not scores.config_path.is_file():
         raise ResultsError(f"{folder}: has no scores: {again}")
     run, name = read_run(scores), folder.resolve().name

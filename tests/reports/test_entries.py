@@ -80,7 +80,7 @@ def test_scores_of_another_entry_or_of_none_are_refused_with_what_to_do(tmp_path
     folder = tmp_path / "in"
     write_entry(folder, "old", 2.0)
     scores = RunFolder(folder / "old" / "scores")
-    again = r".* benchmarks.submit score .*--replace"
+    again = r".* benchmarks.submit score .*"
     (folder / "old").rename(folder / "new")
     with pytest.raises(ResultsError, match=f"no scores of 'new'{again}"):
         page_of(folder, "quick", published)
