@@ -34,21 +34,12 @@ class Parser(argparse.ArgumentParser):
         super().__init__(formatter_class=plain, allow_abbrev=False, **options)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Parse as the base class does.
-
-        Raises:
-            WrongWord: also for an empty value, as "$UNSET" leaves one.
-        """
-        parsed, unknown = super().parse_known_args(args, namespace)
-        for action in self._actions:
-            value = getattr(parsed, action.dest, None)
-            if value is action.default:
-                continue
-            for word in value if isinstance(value, list) else [value]:
-                if isinstance(word, str) and not word.strip(", "):
-                    name = "/".join(action.option_strings) or action.metavar or action.dest
-                    self.error(f"argument {name}: '{word}' names nothing: give a value, or leave it out")
-        return parsed, unknown
+        """Parse as the base class does. Raises WrongWord also for an empty value, as "$UNSET" leaves one."""
+        words = sys.argv[1:] if args is None else args
+        for before, word in zip(["", *words], words):
+            if not word.strip(", ") or (word.startswith("--") and word.endswith("=")):
+                self.error(f"{before} '{word}' names nothing: give a value, or leave it out")
+        return super().parse_known_args(args, namespace)
 
     def error(self, message: str) -> NoReturn:
         """Raise WrongWord."""

@@ -98,7 +98,7 @@ class Material:
 
         Args:
             lame_lambda_pa: of plane stress, not yet times the thickness [Pa]: 44,400 there.
-            lame_mu_pa: of plane stress, not yet times the thickness [Pa]: 23,600 there.
+            lame_mu_pa: likewise [Pa], 23,600 there.
             thickness: [m], 0.47e-3 there.
             areal_density: [kg/m^2], 0.20022 there.
             bending_stiffness: k of scaled hinges [J], 3.96e-5 there.
@@ -106,9 +106,8 @@ class Material:
         Raises:
             ValueError: a value is not finite or outside its physical range.
         """
-        for name, value in {"thickness": thickness, "lambda + 2 mu": lame_lambda_pa + 2 * lame_mu_pa}.items():
-            if not value > 0:
-                raise ValueError(f"{name} = {value}: must be above 0")
+        if not (thickness > 0 and lame_lambda_pa + 2 * lame_mu_pa > 0):
+            raise ValueError("thickness and lambda + 2 mu must be above 0")
         poisson_ratio = lame_lambda_pa / (lame_lambda_pa + 2 * lame_mu_pa)
         return cls(
             young_modulus=2 * lame_mu_pa * (1 + poisson_ratio),

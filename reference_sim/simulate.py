@@ -11,12 +11,14 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from reference_sim.cloth import Cloth, MeshError
 from reference_sim.command_line import Parser, announce_compilation, command
+from reference_sim.files.mesh_files import read_mesh, read_sequence, to_metres_y_up
+from reference_sim.material import Material
 
 if TYPE_CHECKING:
     import numpy as np
 
-    from reference_sim.cloth import Cloth
     from reference_sim.obstacle import Obstacle
 
 FRAMES_ALONE = 60  # of a garment that meets nothing, or an obstacle that stands still
@@ -101,10 +103,6 @@ def read_cloth(options: argparse.Namespace) -> Cloth:
     Raises:
         ValueError: a file, an option or the mesh is no good; the message names it and the remedy.
     """
-    from reference_sim.cloth import Cloth, MeshError
-    from reference_sim.files.mesh_files import read_mesh, to_metres_y_up
-    from reference_sim.material import Material
-
     material = Material.from_file(options.material) if options.material else Material()
     surface = read_mesh(options.garment)
     positions = to_metres_y_up(surface.positions, units=options.units, up=options.up)
@@ -122,12 +120,10 @@ def choose_pins(which: str | None, positions: np.ndarray) -> list[int]:
     """
     if which is None:
         return []
-    height = positions[:, 1]
     if which == "top":
-        chosen: list[int] = (
-            (height >= height.max() - TOP * (height.max() - height.min())).nonzero()[0].tolist()
-        )
-        return chosen
+        height = positions[:, 1]
+        top = height >= height.max() - TOP * (height.max() - height.min())
+        return [int(vertex) for vertex in top.nonzero()[0]]
     words = [word.strip() for word in which.split(",")]
     if not all(word.isdecimal() and int(word) < len(positions) for word in words):
         raise ValueError(f"--pins {which!r}: give 'top', or vertices from 0 to {len(positions) - 1} as '0,9'")
@@ -142,8 +138,6 @@ def read_obstacle(options: argparse.Namespace) -> Obstacle | None:
     """
     if options.obstacle is None:
         return None
-    from reference_sim.cloth import MeshError
-    from reference_sim.files.mesh_files import read_mesh, read_sequence, to_metres_y_up
     from reference_sim.obstacle import Obstacle  # its search for contact serves no cloth that meets nothing
 
     positions, surface = read_sequence(options.obstacle)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -48,7 +48,31 @@ class TimeStepper:
 
     All that many runs of one scene can share is set up here; `start_again` stands between two of them.
 
-    Arguments and what is refused are those of `simulate`.
+    Args:
+        cloth: the rest state.
+        energies: the terms of Phi. Inertia is added here; no other term is.
+        dt: time between frames [s].
+        substeps: backward-Euler steps per frame. Each is a minimisation; frame fields then hold sums of
+            counts, the worst gradient norm, and the energies of the last sub-step.
+        obstacle: the moving body, one mesh per frame; terms of contact read it.
+        guess: initial guess of a step: "previous", "extrapolated" (x + dt v), or "body_transported", moved
+            along with the obstacle's nearest faces (default where there is an obstacle; else "extrapolated");
+            or a function of the step's number, 1 for the first of a run, and its start (V, 3) [m] that
+            returns positions (V, 3) [m]. Pins are then put in place, and contact planes are taken there. The
+            first step is asked for twice where a start is checked, so the answer should depend on the
+            arguments alone.
+        quasi_static: set the velocity to zero after every step, sub-steps included; for settling.
+        refreeze: times that what is frozen in a step, as contact planes, is searched again where the step has
+            ended, and the step solved again from there.
+        options: of the minimiser: method ("newton", "lbfgs", which Newton's method finishes, or a function
+            that makes one of a potential and the other options), tolerance, max_iterations, timeout [s] of
+            one minimisation, ... The default method is "lbfgs", or "newton" with a term whose pairs change
+            with x, as a barrier's do. Where such a term joins a step late (self-contact alone), the method is
+            that of the minimisation without the term, by default "lbfgs", and Newton's method ends the step.
+
+    Raises:
+        ValueError: unknown guess, fewer than 1 sub-step, a step of no size, a tolerance that is no number
+            above 0, a function as method beside a term that joins a step late, which Newton's method ends.
     """
 
     def __init__(
@@ -56,7 +80,7 @@ class TimeStepper:
         cloth: Cloth,
         energies: Sequence[Energy],
         *,
-        dt: float,
+        dt: float = 1 / 30,
         substeps: int = 1,
         obstacle: Obstacle | None = None,
         guess: str | FirstGuess | None = None,
@@ -107,10 +131,7 @@ class TimeStepper:
         """
         x, v, results = state.x, state.v, []
         if pins is not None:
-            pins, shape = np.asarray(pins, dtype=np.float64), (len(self.cloth.pins), 3)
-            if pins.shape != shape or not np.isfinite(pins).all():
-                what = f"simulate: pin_positions({frame}) gives {pins.shape}"
-                raise ValueError(f"{what}: finite positions {shape} [m] are due")
+            pins = _finite(pins, (len(self.cloth.pins), 3), f"pin_positions({frame})")
         for j in range(1, self.substeps + 1):
             share = j / self.substeps
             handles = state.x[self.cloth.pins]
@@ -159,6 +180,50 @@ class TimeStepper:
         """Freeze every term for the step from x with velocity v (V, 3), as it is at the guess (V, 3)."""
         self.potential.prepare(Step(x, v, guess, self.dt, self.obstacle, step))
 
+    def simulate(
+        self,
+        *,
+        frames: int = 60,
+        start: np.ndarray | None = None,
+        velocity: np.ndarray | None = None,
+        pin_positions: Callable[[int], np.ndarray] | None = None,
+        progress: str | None = None,
+    ) -> Trajectory:
+        """Simulate as the function `simulate` does; `start_again` stands between two runs."""
+        if frames < 1:
+            raise ValueError(f"simulate: frames = {frames}: must be at least 1")
+        rest = self.cloth.rest_positions
+        x = _finite(rest if start is None else start, rest.shape, "start")
+        v = _finite(np.zeros_like(rest) if velocity is None else velocity, rest.shape, "velocity")
+        provenance = self.provenance()
+        self.check_start(x, v)
+        state, status, reason = State(x, v), "converged", ""
+        positions, seconds, fields = [x], [0.0], [_fields_of_start(self.potential.energies)]
+        numbers: Iterable[int] = range(1, frames)
+        if progress is not None:
+            numbers = progress_bar(numbers, desc=progress, unit="frame", initial=1, total=frames)
+        for frame in numbers:
+            clock = time.perf_counter()
+            after, results = self.advance(frame, state, pin_positions and pin_positions(frame))
+            elapsed = time.perf_counter() - clock
+            status, reason = _worst(status, reason, frame, results)
+            if after is None:
+                break
+            state = after
+            positions.append(state.x)
+            seconds.append(elapsed)
+            fields.append(_fields(results))
+        return Trajectory(
+            positions=np.array(positions),
+            faces=self.cloth.faces,
+            times=self.frame_dt * np.arange(float(len(positions))),
+            frame_seconds=np.array(seconds),
+            status=status,
+            reason=reason,
+            provenance=provenance,
+            frame_fields={name: np.array([f[name] for f in fields]) for name in fields[0]},
+        )
+
     def provenance(self) -> dict[str, Any]:
         """Return JSON values of the choices that decide the result, meshes apart."""
         minimiser = self.minimiser
@@ -190,16 +255,10 @@ def simulate(
     cloth: Cloth,
     energies: Sequence[Energy],
     *,
-    dt: float = 1 / 30,
     frames: int = 60,
-    obstacle: Obstacle | None = None,
     start: np.ndarray | None = None,
     velocity: np.ndarray | None = None,
     pin_positions: Callable[[int], np.ndarray] | None = None,
-    guess: str | FirstGuess | None = None,
-    quasi_static: bool = False,
-    substeps: int = 1,
-    refreeze: int = 0,
     progress: str | None = None,
     **options: Any,
 ) -> Trajectory:
@@ -208,29 +267,13 @@ def simulate(
     Args:
         cloth: the rest state; its pins stay where `start` has them unless pin_positions moves them.
         energies: the terms of Phi. Inertia is added here; no other term is.
-        dt: time between frames [s].
         frames: number of frames T in the result.
-        obstacle: the moving body, one mesh per frame; terms of contact read it.
         start: (V, 3) [m] at frame 0; default the rest positions.
         velocity: (V, 3) [m/s] at frame 0; default zero.
         pin_positions: frame -> (P, 3) [m], for handles that move.
-        guess: initial guess of a step: "previous", "extrapolated" (x + dt v), or "body_transported", moved
-            along with the obstacle's nearest faces (default where there is an obstacle; else "extrapolated");
-            or a function of the step's number, 1 for the first of a run, and its start (V, 3) [m] that
-            returns positions (V, 3) [m]. Pins are then put in place, and contact planes are taken there. The
-            first step is asked for twice where a start is checked, so the answer should depend on the
-            arguments alone.
-        quasi_static: set the velocity to zero after every step, sub-steps included; for settling.
-        substeps: backward-Euler steps per frame. Each is a minimisation; frame fields then hold sums of
-            counts, the worst gradient norm, and the energies of the last sub-step.
-        refreeze: times that what is frozen in a step, as contact planes, is searched again where the step has
-            ended, and the step solved again from there.
         progress: label of a progress bar with time left; None for silence.
-        options: of the minimiser: method ("newton", "lbfgs", which Newton's method finishes, or a function
-            that makes one of a potential and the other options), tolerance, max_iterations, timeout [s] of
-            one minimisation, ... The default method is "lbfgs", or "newton" with a term whose pairs change
-            with x, as a barrier's do. Where such a term joins a step late (self-contact alone), the method is
-            that of the minimisation without the term, by default "lbfgs", and Newton's method ends the step.
+        options: of a `TimeStepper` and its minimiser: dt, by default 1/30 s, obstacle, guess, substeps,
+            quasi_static, refreeze, method, tolerance, max_iterations, timeout, ...
 
     Returns:
         A Trajectory whose status is "converged" if every frame converged, else the worst of the others:
@@ -240,9 +283,7 @@ def simulate(
         within the tolerance up to round-off alone; the reason tells of the first), energy/<term> [J].
 
     Raises:
-        ValueError: unknown guess, wrong shapes (of a guess too), fewer than 1 frame or sub-step, a step of no
-            size, a tolerance that is no number above 0, a function as method beside a term that joins a step
-            late (self-contact alone), which Newton's method ends.
+        ValueError: wrong shapes (of a guess too), fewer than 1 frame, what a `TimeStepper` refuses.
 
     Example: a triangle that one corner holds falls by g dt^2 in the first step.
 
@@ -257,114 +298,29 @@ def simulate(
         >>> fall.positions[:, 1, 1].round(6).tolist()
         [0.0, -0.000981, -0.002943]
     """
-    stepper = TimeStepper(
-        cloth,
-        energies,
-        dt=dt,
-        substeps=substeps,
-        obstacle=obstacle,
-        guess=guess,
-        quasi_static=quasi_static,
-        refreeze=refreeze,
-        **options,
+    return TimeStepper(cloth, energies, **options).simulate(
+        frames=frames, start=start, velocity=velocity, pin_positions=pin_positions, progress=progress
     )
-    return simulate_with(
-        stepper, frames=frames, start=start, velocity=velocity, pin_positions=pin_positions,
-        progress=progress,
-    )  # fmt: skip
 
 
-def simulate_with(
-    stepper: TimeStepper,
-    *,
-    frames: int = 60,
-    start: np.ndarray | None = None,
-    velocity: np.ndarray | None = None,
-    pin_positions: Callable[[int], np.ndarray] | None = None,
-    progress: str | None = None,
-) -> Trajectory:
-    """Simulate with a stepper that is set up, which `simulate` makes anew for each run.
+def _worst(status: str, reason: str, frame: int, results: Sequence[Result]) -> tuple[str, str]:
+    """Return status and reason of a run after the minimisations on the way to `frame`.
 
-    The stepper is new, or has served another run and was told to `start_again`; for all else see `simulate`.
+    The worst counts, and of equally bad ones the first: a solver that is stopped early gives up in frame 1,
+    which must not hide a later divergence. Until one did not converge, the reason is that of the first that
+    converged within round-off alone.
     """
-    cloth = stepper.cloth
-    if frames < 1:
-        raise ValueError(f"simulate: frames = {frames}: must be at least 1")
-    x = _checked(start, cloth.rest_positions, "start")
-    v = _checked(velocity, np.zeros_like(cloth.rest_positions), "velocity")
-    record = _Record(cloth, stepper.provenance())
-    stepper.check_start(x, v)
-    state = State(x, v)
-    record.add(x, 0.0, 0.0, _fields_of_start(stepper.potential.energies))
-    numbers: Iterable[int] = range(1, frames)
-    if progress is not None:
-        numbers = progress_bar(numbers, desc=progress, unit="frame", initial=1, total=frames)
-    for frame in numbers:
-        clock = time.perf_counter()
-        after, results = stepper.advance(frame, state, pin_positions and pin_positions(frame))
-        seconds = time.perf_counter() - clock
-        record.note(frame, results)
-        if after is None:
-            break
-        state = after
-        record.add(state.x, frame * stepper.frame_dt, seconds, _fields(results))
-    return record.trajectory()
-
-
-@dataclass
-class _Record:
-    """Frames of one simulation so far, and the status of the whole."""
-
-    cloth: Cloth
-    provenance: dict[str, Any]
-    positions: list[np.ndarray] = field(default_factory=list)
-    times: list[float] = field(default_factory=list)
-    seconds: list[float] = field(default_factory=list)
-    fields: list[dict[str, float]] = field(default_factory=list)
-    status: str = "converged"
-    reason: str = ""
-
-    def note(self, frame: int, results: Sequence[Result]) -> None:
-        """Take the status of the whole from the minimisations on the way to `frame`.
-
-        The worst counts, and of equally bad ones the first: a solver that is stopped early gives up in frame
-        1, which must not hide a later divergence. Until one did not converge, the reason is that of the first
-        that converged within round-off alone.
-        """
-        for result in results:
-            worse = STATUSES[result.status] > STATUSES[self.status]
-            if worse or (result.relaxed and not self.reason):
-                self.status, self.reason = result.status, f"frame {frame}: {result.reason}"
-
-    def add(self, x: np.ndarray, time: float, seconds: float, fields: dict[str, float]) -> None:
-        """Add a frame: positions (V, 3) [m], its time [s], [s] on the clock, further numbers."""
-        self.positions.append(x)
-        self.times.append(time)
-        self.seconds.append(seconds)
-        self.fields.append(fields)
-
-    def trajectory(self) -> Trajectory:
-        """Return all frames so far."""
-        return Trajectory(
-            positions=np.array(self.positions),
-            faces=self.cloth.faces,
-            times=np.array(self.times),
-            frame_seconds=np.array(self.seconds),
-            status=self.status,
-            reason=self.reason,
-            provenance=self.provenance,
-            frame_fields={k: np.array([f[k] for f in self.fields]) for k in self.fields[0]},
-        )
+    for result in results:
+        if STATUSES[result.status] > STATUSES[status] or (result.relaxed and not reason):
+            status, reason = result.status, f"frame {frame}: {result.reason}"
+    return status, reason
 
 
 def _fields_of_start(energies: Sequence[Energy]) -> dict[str, float]:
     """Return the fields of frame 0, which is given and was not minimised."""
-    counts = {"iterations": 0.0, "factorisations": 0.0, "gradient_norm": float("nan")}
-    return (
-        counts
-        | {"converged": 1.0, "relaxed": 0.0}
-        | {f"energy/{energy.name}": float("nan") for energy in energies}
-    )
+    counts = {"iterations": 0.0, "factorisations": 0.0, "gradient_norm": np.nan}
+    counts |= {"converged": 1.0, "relaxed": 0.0}
+    return counts | {f"energy/{energy.name}": np.nan for energy in energies}
 
 
 def _fields(results: Sequence[Result]) -> dict[str, float]:
@@ -377,12 +333,9 @@ def _fields(results: Sequence[Result]) -> dict[str, float]:
     } | {f"energy/{name}": value for name, value in results[-1].terms.items()}
 
 
-def _checked(value: np.ndarray | None, default: np.ndarray, name: str) -> np.ndarray:
-    if value is None:
-        return default.copy()
+def _finite(value: np.ndarray, shape: tuple[int, ...], what: str) -> np.ndarray:
+    """Return a copy of finite numbers of this shape. Raises ValueError for any others."""
     value = np.array(value, dtype=np.float64)
-    if value.shape != default.shape:
-        raise ValueError(f"simulate: {name} has shape {value.shape}: expected {default.shape}")
-    if len(bad := np.flatnonzero(~np.isfinite(value).all(axis=1))):
-        raise ValueError(f"simulate: {name} of vertex {bad[0]} is {value[bad[0]]}: give finite numbers")
+    if value.shape != shape or not np.isfinite(value).all():
+        raise ValueError(f"simulate: {what} is {value.shape}: finite numbers {shape} are due")
     return value

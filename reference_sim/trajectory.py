@@ -21,8 +21,6 @@ from reference_sim.files.atomic_files import replacing
 if TYPE_CHECKING:
     import h5py
 
-TRAJECTORY_SUFFIXES = (".vtkhdf", ".hdf")
-
 
 class TrajectoryError(ValueError):
     """Trajectory file that cannot be read; the message names file and remedy."""

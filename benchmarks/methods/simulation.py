@@ -10,7 +10,7 @@ from typing import Any
 from benchmarks.declarations import load_function
 from benchmarks.method import Method
 from benchmarks.scene import BuiltScene
-from reference_sim.time_loop import TimeStepper, simulate_with
+from reference_sim.time_loop import TimeStepper
 from reference_sim.trajectory import Trajectory
 
 
@@ -53,8 +53,7 @@ class Simulation(Method):
 
     def _simulate(self, *, frames: int, progress: str | None = None) -> Trajectory:
         scene = self.scene
-        return simulate_with(
-            self.stepper,
+        return self.stepper.simulate(
             frames=frames,
             start=scene.start,
             velocity=scene.start_velocity,
