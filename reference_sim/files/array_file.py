@@ -133,12 +133,7 @@ class _Stand:
         return dense
 
 
-class _Unread(_Stand):
-    """Stand for a sparse matrix in another layout, which no reader here asks for."""
-
-
-STANDS = {"chumpy.ch.Ch": _Stand, "csc_matrix": _Stand, "csc_array": _Stand}
-STANDS |= {f"{layout}_{kind}": _Unread for layout in ("csr", "coo") for kind in ("matrix", "array")}
+STANDS = ("chumpy.ch.Ch", "csc_matrix", "csc_array")
 
 
 class _Unpickler(pickle.Unpickler):
@@ -147,10 +142,9 @@ class _Unpickler(pickle.Unpickler):
         module = MOVED.get(module, module).replace("numpy.core", "numpy._core")
         if name in PLAIN.get(module, ()):
             return super().find_class(module, name)
-        stand = STANDS.get(name if module.startswith("scipy.sparse.") else f"{module}.{name}")
-        if stand is None:
-            raise ValueError(f"names {module}.{name}, which is no plain value; write arrays by numpy.savez")
-        return stand
+        if (name if module.startswith("scipy.sparse.") else f"{module}.{name}") in STANDS:
+            return _Stand
+        raise ValueError(f"names {module}.{name}, which is no plain value; write arrays by numpy.savez")
 
 
 def read_pickled_arrays(path: str | Path, names: Collection[str]) -> dict[str, np.ndarray]:

@@ -34,9 +34,6 @@ def terms_of(cloth: Cloth) -> list[Energy]:
     return [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)]
 
 
-# Steps
-
-
 def test_falling_without_velocity_kept_is_a_ladder():
     cloth = Cloth(SHEET, FACES)
     result = simulate(cloth, terms_of(cloth), frames=11, dt=0.02, quasi_static=True)
@@ -66,16 +63,10 @@ def test_a_function_as_first_guess_is_asked_at_each_step_and_terms_freeze_there_
         simulate(cloth, terms, frames=3, guess=lambda step, x: x[1:])
 
 
-# Pins
-
-
 def test_a_cloth_without_free_vertices_is_a_puppet():
     cloth = Cloth(SHEET, FACES, pins=range(len(SHEET)))
     result = simulate(cloth, terms_of(cloth), frames=3, pin_positions=lambda frame: SHEET + 0.1 * frame)
     assert result.status == "converged" and (result.positions[2] == SHEET + 0.2).all()
-
-
-# What comes out
 
 
 def test_the_record_of_a_run():
@@ -84,18 +75,13 @@ def test_the_record_of_a_run():
     result = simulate(cloth, energies, frames=5, dt=0.02)
     assert result.positions.shape == (5, 49, 3) and (result.positions[0] == SHEET).all()
     assert result.times == pytest.approx(0.02 * np.arange(5), rel=1e-15)
-    assert result.frame_seconds.shape == (5,) and (result.frame_seconds[1:] > 0).all()
-    assert (result.faces == FACES).all()
+    assert (result.frame_seconds[1:] > 0).all() and (result.faces == FACES).all()
     fields = result.frame_fields
-    assert {"iterations", "factorisations", "gradient_norm", "converged"} <= set(fields)
     assert all(values.shape == (5,) for values in fields.values())
     assert (fields["converged"] == 1).all() and (fields["gradient_norm"][1:] <= 1e-6).all()
     for energy in energies:
         series = [float(energy.energy(torch.as_tensor(x)).sum()) for x in result.positions[1:]]
         assert fields[f"energy/{energy.name}"][1:] == pytest.approx(series, rel=1e-10, abs=1e-15)
-    x_hat = 2 * result.positions[1] - result.positions[0]
-    inertia = 0.5 / 0.02**2 * (cloth.masses[:, None] * (result.positions[2] - x_hat) ** 2).sum()
-    assert fields["energy/inertia"][2] == pytest.approx(inertia, rel=1e-10)
     assert set(result.provenance["terms"]) == {"strain", "bending", "gravity", "inertia"}
     assert result.provenance["dt_s"] == 0.02 and result.provenance["guess"] == "extrapolated"
 
@@ -110,9 +96,6 @@ def test_two_runs_give_the_same_bits_also_with_the_same_terms():
     runs = [simulate(cloth, energies, obstacle=table, velocity=pushed, frames=8) for _ in range(2)]
     assert runs[0].frame_fields["energy/friction"][-1] > 0
     assert (runs[0].positions == runs[1].positions).all()
-
-
-# Failures
 
 
 class Poison(Energy):
@@ -165,8 +148,6 @@ def test_a_step_that_round_off_excuses_says_so_in_its_frame():
     assert result.status == "converged" and result.frame_fields["converged"].all()
     assert relaxed[1:].all() and (residual[1:] > 1e-6).all()
     assert result.reason.startswith(f"frame 1: round-off: residual {residual[1]:.1e} above tolerance 1.0e-06")
-    near = simulate(cloth, terms_of(cloth), frames=4)
-    assert near.reason == "" and not near.frame_fields["relaxed"].any()
 
 
 @pytest.mark.parametrize(
@@ -183,15 +164,13 @@ def test_a_step_that_round_off_excuses_says_so_in_its_frame():
         ({"dt": 1e300}, "dt / substeps = 1e+300 s: give 1e-07 to 10000 s"),
         ({"tolerance": np.nan}, "tolerance = nan: give a finite number above 0"),
         ({"tolerance": -1e-6, "method": "newton"}, "tolerance = -1e-06: give"),
+        ({"method": "bfgs"}, "unknown minimiser 'bfgs': choose one of newton, lbfgs"),
     ],
 )
 def test_what_cannot_be_simulated_is_refused(options, message):
     cloth = Cloth(SHEET, FACES)
     with pytest.raises(ValueError, match=re.escape(message)):
         simulate(cloth, terms_of(cloth), **({"frames": 2} | options))
-
-
-# Sub-steps
 
 
 def test_frames_of_sub_steps_are_every_nth_frame_of_small_steps_and_sum_their_work():
@@ -205,16 +184,6 @@ def test_frames_of_sub_steps_are_every_nth_frame_of_small_steps_and_sum_their_wo
     for name in ("iterations", "factorisations"):
         sums = fine.frame_fields[name][1:].reshape(3, 3).sum(axis=1)
         np.testing.assert_array_equal(coarse.frame_fields[name][1:], sums)
-
-
-def test_pins_arrive_exactly():
-    cloth = Cloth(SHEET, FACES, pins=[0, 6])
-    places = np.random.default_rng(0).normal(scale=0.01, size=(4, 2, 3)) + SHEET[[0, 6]]
-    places[0] = SHEET[[0, 6]]
-    moved = simulate(
-        cloth, [StretchStVK(cloth)], frames=4, substeps=3, pin_positions=lambda k: places[k], max_iterations=3
-    )
-    np.testing.assert_array_equal(moved.positions[:, [0, 6]], places)
 
 
 def test_a_minimiser_that_cannot_start_again_is_made_anew_for_the_next_run():

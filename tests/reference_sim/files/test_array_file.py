@@ -22,42 +22,33 @@ from reference_sim.files.array_file import (
 )
 
 POSES = np.arange(12.0).reshape(4, 3)
-OTHERS = {
+ARRAYS = {
+    "poses": POSES,
     "by_columns": np.asfortranarray(POSES),
     "empty": np.zeros((0, 3)),
     "one": np.array(30.0),
     "big_endian": POSES.astype(">f4"),
     "word": np.array("female"),
+    "turned": POSES.T,
     "letters": np.array([b"a", b"bc"]),
-    "truth": np.array([True, False]),
 }
 
 
 @pytest.mark.parametrize("save", [np.savez, np.savez_compressed])
-def test_whole_files_are_read_as_numpy_reads_them(tmp_path, save):
-    save(tmp_path / "a.npz", poses=POSES, **OTHERS)
+def test_whole_files_are_read_as_they_were_written(tmp_path, save):
+    save(tmp_path / "a.npz", **ARRAYS)
     arrays = read_arrays(tmp_path / "a.npz")
-    with np.load(tmp_path / "a.npz") as stored:
-        for name in stored.files:
-            assert arrays[name].dtype == stored[name].dtype and arrays[name].flags.writeable
-            np.testing.assert_array_equal(arrays[name], stored[name])
-        assert list(arrays) == stored.files
+    assert list(arrays) == list(ARRAYS)
     assert list(read_arrays(tmp_path / "a.npz", ("poses", "absent"))) == ["poses"]
-    for name, array in OTHERS.items():
-        np.save(tmp_path / f"{name}.npy", array)
-        np.testing.assert_array_equal(read_array(tmp_path / f"{name}.npy"), array)
+    for name, array in ARRAYS.items():
+        write_array(tmp_path / "a.npy", array)
+        for stored in (arrays[name], read_array(tmp_path / "a.npy")):
+            assert stored.dtype == array.dtype and stored.shape == array.shape and stored.flags.writeable
+            np.testing.assert_array_equal(stored, array)
 
 
-@pytest.mark.parametrize("array", [np.array(3.0), np.zeros((0, 3)), np.arange(6.0).reshape(2, 3).T])
-def test_what_is_written_is_read(tmp_path, array):
-    write_array(tmp_path / "a.npy", array)
-    assert read_array(tmp_path / "a.npy").shape == array.shape
-    np.testing.assert_array_equal(read_array(tmp_path / "a.npy"), array)
-
-
-def whole_archive() -> bytes:
-    np.savez(stream := io.BytesIO(), poses=POSES)
-    return stream.getvalue()
+np.savez(ARCHIVE := io.BytesIO(), poses=POSES)
+WHOLE = ARCHIVE.getvalue()
 
 
 @pytest.mark.parametrize(
@@ -65,9 +56,8 @@ def whole_archive() -> bytes:
     [
         (None, "no such file"),
         (b"", "not a zip file"),
-        (whole_archive()[:-30], "not a zip file"),
-        (whole_archive().replace(b"(4, 3)", b"(9, 9)"), "array 'poses': "),
-        (whole_archive().replace(b"<f8", b"<f0"), "array 'poses': "),
+        (WHOLE[:-30], "not a zip file"),
+        (WHOLE.replace(b"(4, 3)", b"(9, 9)"), "array 'poses': "),
     ],
 )
 def test_an_archive_that_cannot_be_read_is_refused_in_one_line(tmp_path, data, reason):
@@ -81,14 +71,11 @@ def test_an_archive_that_cannot_be_read_is_refused_in_one_line(tmp_path, data, r
 
 ROLL_OUT = {
     "pred": np.arange(24, dtype=np.float32).reshape(2, 4, 3),
-    "obstacle": np.ones((2, 5, 3), dtype=">f8"),
     "obstacle_faces": np.asfortranarray(np.array([[0, 1, 2]], dtype=np.uint32)),
     "metrics": defaultdict(list, time=[0.1, np.float64(0.2)]),
     "config": OrderedDict(name="höd", sizes=(1, None, True), tags={"a"}),
     "turned": np.arange(24).reshape(2, 3, 4).transpose(1, 0, 2),
-    "names": np.array(["neck", "hem"]),
     "columns": scipy.sparse.csc_matrix(np.diag([1.0, 2.0, 3.0])[:2]),
-    "rows": scipy.sparse.csr_array(np.eye(2)),
     "fps": 30.0,
 }
 
@@ -98,10 +85,10 @@ def pickled(path: Path, content: object, protocol: int = 4) -> Path:
     return path
 
 
-@pytest.mark.parametrize("protocol", (0, 2, 5))
+@pytest.mark.parametrize("protocol", (0, 5))
 def test_a_pickle_gives_its_arrays_by_name(tmp_path, protocol):
     read = read_pickled_arrays(pickled(tmp_path / "a.pkl", ROLL_OUT, protocol), ROLL_OUT)
-    assert set(read) == set(ROLL_OUT) - {"metrics", "config", "rows"}
+    assert set(read) == set(ROLL_OUT) - {"metrics", "config"}
     for key, array in read.items():
         value = ROLL_OUT[key].toarray() if key == "columns" else np.asarray(ROLL_OUT[key])
         assert type(array) is np.ndarray and array.dtype.kind == value.dtype.kind
@@ -172,6 +159,7 @@ BROKEN = {
     "fields": pickle.dumps({"a": np.zeros(2, dtype=[("a", "f4")])}),
     "no dict": pickle.dumps(np.arange(6.0)),
     "no array": pickle.dumps({"b": 1, "a": None}),
+    "sparse rows": pickle.dumps({"a": scipy.sparse.csr_array(np.eye(2))}),
     "empty": b"", "byte": b"\x80", "zip": b"PK\x03\x04",
 }  # fmt: skip
 

@@ -11,16 +11,10 @@ from reference_sim.files.mesh_files import read_mesh, read_sequence, to_metres_y
 from tests.reference_sim.meshes import grid, sphere
 
 
-def write(path, positions, faces, kind="triangle"):
+def write(path, positions, faces):
     path.parent.mkdir(exist_ok=True)
-    meshio.write(path, meshio.Mesh(positions, [(kind, np.asarray(faces, dtype=np.int32))]))
+    meshio.write(path, meshio.Mesh(positions, [("triangle", np.asarray(faces, dtype=np.int32))]))
     return path
-
-
-def triangles(positions, faces):
-    """The triangles as a sorted list of corner coordinates, whatever the numbering."""
-    corners = np.round(positions[faces], 5).reshape(len(faces), 3, 3)
-    return sorted(tuple(sorted(map(tuple, t.tolist()))) for t in corners)
 
 
 @pytest.mark.parametrize("suffix", [".obj", ".ply", ".stl", ".off"])
@@ -28,15 +22,9 @@ def test_each_format_gives_the_triangles_that_were_written(tmp_path, suffix):
     positions, faces = sphere(1, 0.3)
     surface = read_mesh(write(tmp_path / f"ball{suffix}", positions, faces))
     assert surface.positions.dtype == np.float64 and surface.faces.dtype == np.int64
-    assert triangles(surface.positions, surface.faces) == triangles(positions, faces)
+    np.testing.assert_allclose(surface.positions[surface.faces], positions[faces], atol=1e-6)
     if suffix != ".stl":  # a list of loose triangles has no numbering to keep
         np.testing.assert_array_equal(surface.faces, faces)
-
-
-def test_quads_are_cut_along_the_diagonal_from_their_first_corner(tmp_path):
-    square = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
-    surface = read_mesh(write(tmp_path / "square.obj", square, [[0, 1, 2, 3]], "quad"))
-    assert surface.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
 
 
 def test_colours_comments_and_places_from_the_end_in_obj_change_nothing(tmp_path):
@@ -57,7 +45,9 @@ def test_a_vertex_on_a_seam_has_a_texture_coordinate_in_each_face(tmp_path):
     assert surface.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
     assert surface.uv.tolist() == [[[0, 0], [1, 0], [1, 1]], [[5, 0], [6, 1], [5, 1]]]
     path.write_text(SEAM + "f 1/1 2/2 3/3 4/6\n")  # a quad is cut with its coordinates
-    assert read_mesh(path).uv.tolist() == [[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [5, 1]]]
+    quad = read_mesh(path)
+    assert quad.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+    assert quad.uv.tolist() == [[[0, 0], [1, 0], [1, 1]], [[0, 0], [1, 1], [5, 1]]]
     path.write_text(SEAM + "f 1/1 2/2 3/3\nf 1 3 4\n")
     assert np.isnan(read_mesh(path).uv).all(axis=(1, 2)).tolist() == [False, True]
     path.write_text(SEAM + "f 1 2 3\nf 1//2 3//2 4//2\n")
@@ -85,11 +75,7 @@ def test_texture_coordinates_of_vertices_are_those_of_their_corners(tmp_path):
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1e300 0\nf 1 2 3\n", "vertex 2 is not finite, or farther than"),
         ("a.obj", SEAM + "f 1 2 9\n", "triangle 0 names a vertex beyond the 4"),
         ("a.obj", SEAM + "f 1/1 2/2 3/7\n", "triangle 0 names a texture coordinate beyond the 6"),
-        (
-            "a.obj",
-            "".join(f"v {k} {k * k} 0\n" for k in range(5)) + "f 1 2 3 4 5\n",
-            "face 0 has 5 corners: triangulate",
-        ),
+        ("a.obj", SEAM + "f 1 2 3 4 1\n", "face 0 has 5 corners: triangulate"),
     ],
 )
 def test_a_bad_file_is_named_with_what_is_wrong(tmp_path, capfd, name, text, message):

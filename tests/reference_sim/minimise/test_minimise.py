@@ -12,29 +12,23 @@ from tests.reference_sim.meshes import random_rotation
 from tests.reference_sim.minimise.minima import (
     FACES,
     SHEET,
-    TOLERANCE,
     assert_minimum,
     gradient_by_torch,
     hanging,
 )
 
 both = pytest.mark.parametrize("method", MINIMISERS)
-SIDES = np.flatnonzero((SHEET[:, 0] == 0) | (SHEET[:, 0] == 0.5))
 
 
 @both
 def test_a_sheet_hangs_from_two_corners(method):
     potential, x0 = hanging()
-    before = x0.copy()
     result = minimise(potential, x0, method)
-    assert (x0 == before).all()
     assert_minimum(potential, x0, result)
     # The two pins carry the whole weight, minus what the lumped masses of the pins carry themselves.
     carried = gradient_by_torch(potential, result.positions)[potential.cloth.pins]
     assert carried.sum(axis=0) == pytest.approx([0, potential.cloth.masses.sum() * GRAVITY, 0], abs=1e-6)
-    assert result.iterations > 0 and result.factorisations > 0
-    assert set(result.seconds) >= {"assemble", "factorise", "solve", "evaluate"}
-    assert all(seconds >= 0 for seconds in result.seconds.values())
+    assert result.iterations > 0 and result.factorisations > 0 and min(result.seconds.values()) >= 0
 
 
 @pytest.mark.parametrize("term", [BendHinge, StretchSpring])
@@ -45,15 +39,6 @@ def test_a_state_without_energy_is_diverged_and_raises_nothing(method, term):
     for start in (np.zeros_like(SHEET), torn):
         result = minimise(Potential([term(cloth), Inertia(cloth, 0.01)]), start, method)
         assert result.status == "diverged" and "not finite" in result.reason
-
-
-@both
-def test_too_few_iterations_is_said(method):
-    potential, x0 = hanging()
-    options = {} if method == "newton" else {"finish": False}
-    result = minimise(potential, x0, method, max_iterations=3, **options)
-    assert result.status == "max_iterations" and result.iterations == 3
-    assert "3 iterations" in result.reason and result.gradient_norm > TOLERANCE
 
 
 @both
@@ -90,11 +75,3 @@ def test_a_factorisation_used_again_saves_others_and_ends_in_a_minimum(case):
     assert_minimum(potential, x0, again)
     # 16 or 18 of 20 where the sheet hangs: that much is round-off.
     assert again.factorisations <= 0.9 * fresh.factorisations and again.iterations > again.factorisations
-
-
-def test_unknown_names_are_refused():
-    potential, x0 = hanging()
-    with pytest.raises(ValueError, match=r"unknown minimiser 'bfgs': choose one of newton, lbfgs"):
-        minimise(potential, x0, "bfgs")
-    with pytest.raises(TypeError, match="tolerence"):
-        minimise(potential, x0, tolerence=1e-3)
