@@ -7,8 +7,8 @@ curvature from all eigenvalues of the dense Hessian. A claim that does not hold 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import partial
+from typing import NamedTuple
 
 import numpy as np
 
@@ -76,18 +76,13 @@ def energy_of(potential: sim.Potential, x: np.ndarray) -> tuple[float, float]:
     return sum(parts), sum(map(abs, parts))
 
 
-@dataclass(frozen=True)
-class OptimalityCheck:
-    """Residual and curvature at a point.
+class OptimalityCheck(NamedTuple):
+    """Residual and curvature at a point."""
 
-    residual, round_off: relative residual, and what round-off does to it [1]. lowest_curvature: smallest
-    eigenvalue of the Hessian over free vertices; zero_curvature: size below which one counts as zero [N/m].
-    """
-
-    residual: float
-    round_off: float
-    lowest_curvature: float
-    zero_curvature: float
+    residual: float  # [1], relative
+    round_off: float  # [1], what it does to the residual
+    lowest_curvature: float  # [N/m], smallest eigenvalue of the Hessian over free vertices
+    zero_curvature: float  # [N/m], size below which one counts as zero
 
 
 def optimality_of(potential: sim.Potential, x: np.ndarray) -> OptimalityCheck:

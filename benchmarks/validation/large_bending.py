@@ -1,10 +1,10 @@
-"""Large bending with a known answer: elastica, hanging strips, lateral buckling, slit annulus.
+"""Large bending with a known answer: elastica, catenary, lateral buckling, slit annulus.
 
 Elastica: a clamped strip against Euler's. Hinges stand for a plate stiffness D that depends on the mesh (see
 plates.py), so D, and where the clamp acts, are calibrated from small deflections (see clamped_strip.py).
 
-Hanging strip and catenary, with lambda = 0: a string of force N = E2 s (s^2 - 1)/2 per width at stretch s,
-whose weight gives the force at each of its points; integrated by scipy.
+Catenary, with lambda = 0: a string of force N = E2 s (s^2 - 1)/2 per width at stretch s, whose weight gives
+the force at each of its points; integrated by scipy.
 
 Lateral buckling: a strip on edge, clamped at one end, gives way sideways under P = 4.0126 (EI GJ)^0.5 / L^2
 at the other end (Michell 1899, Prandtl 1899), or 12.85 (EI GJ)^0.5 / L^2 spread evenly over the length
@@ -12,10 +12,9 @@ at the other end (Michell 1899, Prandtl 1899), or 12.85 (EI GJ)^0.5 / L^2 spread
 2021. Of a narrow strip of width b on equilateral triangles EI = D (1 - nu^2) b and GJ = 2 D (1 - nu) b.
 
 Slit annular plate (Sze, Liu and Lo 2004): clamped at one lip of the slit, the other lifted by a line load.
-E = 21 MPa, nu = 0, thickness 0.03 m, radii 6 and 10 m, 0.8 N/m on the free lip. Shells of the literature
-lift its inner corner by 13.891 m and the outer by 17.528 m. Equilateral triangles are mapped to the annulus
-by exp, which is conformal. Such a plate has nu = -1/3, so its D is C11 = k/4, and the energy of Gaussian
-curvature makes it one of nu = 0; without that term the limit is another plate, which the load lifts less.
+Equilateral triangles are mapped to the annulus by exp, which is conformal. Such a plate has nu = -1/3, so its
+D is C11 = k/4, and the energy of Gaussian curvature makes it one of nu = 0; without that term the limit is
+another plate, which the load lifts less.
 """
 
 from __future__ import annotations
@@ -88,13 +87,10 @@ def tip_distance(weight: float = 0.0, load: float = 0.0) -> float:
 
 
 E2 = 32.965  # [N/m] membrane modulus
-HANGING_THICKNESS = 0.47e-3
-HANGING_MATERIAL = sim.Material(
-    young_modulus=E2 / HANGING_THICKNESS, poisson_ratio=0.0, thickness=HANGING_THICKNESS
-)
-WEIGHT = HANGING_MATERIAL.areal_density * sim.GRAVITY  # [N/m^2]
+STRING = sim.Material(young_modulus=E2 / 0.47e-3, poisson_ratio=0.0, thickness=0.47e-3)
+WEIGHT = STRING.areal_density * sim.GRAVITY  # [N/m^2]
 SPAN = 0.8  # [m] between the ends of the catenary
-HANGING_ROWS = (12, 24, 48)
+STRING_CELLS = (12, 24, 48)
 
 
 def string_stretch(force: float) -> float:
@@ -102,35 +98,6 @@ def string_stretch(force: float) -> float:
     from scipy.optimize import brentq
 
     return brentq(lambda s: E2 * s * (s * s - 1) / 2 - force, 1.0, 3.0, xtol=1e-15)
-
-
-def exact_tip() -> float:
-    """Return the length [m] of the strip of 1 m hanging by one end."""
-    from scipy.integrate import quad
-
-    return quad(lambda hanging: string_stretch(WEIGHT * hanging), 0, 1, epsabs=1e-13)[0]
-
-
-@known_answer(unit="m", tolerance=2e-6, reason="second order in 1/24 of the length")
-def hanging_strip_tip() -> tuple[float, float]:
-    """Return the distance of the free end of a 1 m strip from the hung one, measured and exact."""
-    return _hanging(HANGING_ROWS[1]), exact_tip()
-
-
-@known_answer(expected=2.0, tolerance=0.2, reason="12, 24 and 48 cells are few")
-def hanging_strip_order() -> float:
-    """Return the order in h of the tip of a hanging strip."""
-    exact = exact_tip()
-    return order(lambda rows: abs(_hanging(rows) - exact), HANGING_ROWS)
-
-
-def _hanging(rows: int) -> float:
-    points, faces = right_grid(rows, 4, 1.0, 4.0 / rows)
-    points[:, 1] -= 1.0  # the top edge at y = 0
-    cloth = flat_cloth(points, faces, HANGING_MATERIAL, held=points[:, 1] > -1e-9)
-    start = cloth.rest_positions * [1.0, 1.02, 1.0]
-    x = minimum([energies.StretchStVK(cloth), energies.Gravity(cloth)], start, tolerance=1e-9)
-    return float(-x[points[:, 1] < -1 + 1e-9, 1].mean())
 
 
 def exact_catenary() -> dict[str, float]:
@@ -157,7 +124,7 @@ def exact_catenary() -> dict[str, float]:
 @cache
 def catenary() -> dict[str, tuple[float, float]]:
     """Return the horizontal force per width, or the sag, of an elastic catenary, 1 m over a span of 0.8 m."""
-    measured, exact = _catenary(HANGING_ROWS[-1]), exact_catenary()
+    measured, exact = _catenary(STRING_CELLS[-1]), exact_catenary()
     return {f"catenary_{name}": (measured[name], exact[name]) for name in exact}
 
 
@@ -165,13 +132,13 @@ def catenary() -> dict[str, tuple[float, float]]:
 def catenary_order() -> float:
     """Return the order in h of the sag of an elastic catenary."""
     exact = exact_catenary()["sag"]
-    return order(lambda columns: abs(_catenary(columns)["sag"] - exact), HANGING_ROWS)
+    return order(lambda columns: abs(_catenary(columns)["sag"] - exact), STRING_CELLS)
 
 
 def _catenary(columns: int) -> dict[str, float]:
     width = 2.0 / columns
     points, faces = right_grid(2, columns, width, 1.0)
-    cloth = flat_cloth(points, faces, HANGING_MATERIAL, held=ends(points), lies=True)
+    cloth = flat_cloth(points, faces, STRING, held=ends(points), lies=True)
     start = cloth.rest_positions * [SPAN, 1.0, 1.0] - [0.5 * SPAN, 0.0, 0.0]
     start[:, 1] = -0.28 * (1 - (2 * start[:, 0] / SPAN) ** 2)  # near the answer, not it
     terms = [energies.StretchStVK(cloth), energies.Gravity(cloth)]
@@ -247,8 +214,8 @@ def buckling_factor(cloth: sim.Cloth, forces: np.ndarray) -> float:
     return 1 / float(values[0])
 
 
-INNER, OUTER, LOAD = 6.0, 10.0, 0.8
-SZE = (13.891, 17.528)  # [m] lifts of the inner and the outer corner
+INNER, OUTER, LOAD = 6.0, 10.0, 0.8  # [m] radii, [N/m] on the free lip
+SZE = (13.891, 17.528)  # [m] lifts of the inner and the outer corner of shells
 YOUNG = 21e6
 ANNULUS_THICKNESS = 0.03
 D = YOUNG * ANNULUS_THICKNESS**3 / 12  # [J] of the plate, nu = 0
