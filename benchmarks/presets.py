@@ -81,7 +81,7 @@ def find_preset(name: str) -> Preset:
     >>> find_preset("smoke").garment_vertices
     350
     """
-    for preset in PRESETS:
-        if preset.name == name:
-            return preset
-    raise ValueError(f"unknown preset '{name}'; choose from {', '.join(p.name for p in PRESETS)}")
+    known = {preset.name: preset for preset in PRESETS}
+    if name not in known:
+        raise ValueError(f"unknown preset '{name}'; choose from {', '.join(known)}")
+    return known[name]

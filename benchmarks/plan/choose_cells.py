@@ -15,7 +15,7 @@ from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.study import Part, Study, StudyError, nearest
 from benchmarks.scene import Scene
-from benchmarks.scenes import GARMENT_SCENES, SCENES, all_scenes, further_scenes
+from benchmarks.scenes import all_scenes, further_scenes
 from benchmarks.validation.case import METHOD, Case
 
 SETS = ("{smoke}", "{short}")  # of cases
@@ -73,7 +73,7 @@ def choose_cells(read: ReadStudy) -> tuple[tuple[Cell, ...], tuple[Case, ...]]:
     cells = _timed_once(
         sorted((*chosen.values(), *stored), key=lambda c: (places[c.scene.name], order[c.method], c.seed))
     )
-    _check_user_scenes({cell.scene.name: cell.scene for cell in cells}, read.motions)
+    _check_user_scenes([cell.scene for cell in cells], read.motions)
     return tuple(cells), cases
 
 
@@ -129,7 +129,7 @@ def expanded(patterns: Sequence[str], motions: Motions) -> list[str]:
         names = motions.measured_of(garment) if place[1] == "motion" else motions.dynamic_measured
         if place[2]:
             names = names[int(place[2]) - 1 : int(place[2])]
-        found += [PLACES.sub(name.replace("\\", "\\\\"), pattern) for name in names]
+        found += [pattern.replace(place[0], name) for name in names]
     return found
 
 
@@ -166,39 +166,34 @@ def _check_words(read: ReadStudy) -> None:
     """Raise StudyError for a word of a field that nothing has as its name."""
     study, methods, cases = read.study, list(read.methods), [case.name for case in read.cases]
 
-    def check(field: tuple[str, ...], known: Sequence[str], words: Iterable[str]) -> None:
+    def check(known: Sequence[str], words: Iterable[str], *field: str) -> None:
         for word in words:
             if not matching(known, [word.removeprefix("!")]):
                 what, hint = field[-1].removesuffix("s"), ""
-                if what == "scene" and word.partition("/")[0] in {g.garment for g in GARMENT_SCENES}:
+                if what == "scene" and "/" in word:
                     hint = " (scenes of a dressed body are validation and test motions: see test_motions)"
-                place = study.place(*field)
-                raise StudyError(f"{place}: unknown {what} '{word}'; {nearest(word, known)}{hint}")
+                study.refuse(f"unknown {what} '{word}'; {nearest(word, known)}{hint}", *field)
 
-    check(("scenes",), [*read.scenes, *cases], study.scenes)
-    check(("methods",), methods, study.methods)
+    check([*read.scenes, *cases], study.scenes, "scenes")
+    check(methods, study.methods, "methods")
     # Scenes that tailor a T-shirt themselves are none of a run with another garment.
-    scenes = list(dict.fromkeys((*read.scenes, *all_scenes((), ()))))
+    scenes = list({**read.scenes, **all_scenes((), ())})
     for name, part in study.parts.items():
         patterns = expanded((*part.scenes, *part.optional_scenes), read.motions)
-        check(("parts", name, "scenes"), scenes, patterns)
-        check(("parts", name, "methods"), methods, part.methods)
-        check(("parts", name, "cases"), [*cases, *SETS], part.cases)
+        check(scenes, patterns, "parts", name, "scenes")
+        check(methods, part.methods, "parts", name, "methods")
+        check([*cases, *SETS], part.cases, "parts", name, "cases")
 
 
-def _check_user_scenes(scenes: Mapping[str, Scene], motions: Motions) -> None:
+def _check_user_scenes(scenes: Sequence[Scene], motions: Motions) -> None:
     """Raise StudyError for a start or a motion that a user's scene names and nobody knows."""
     from snug.motion.library import LIBRARY  # loads numpy
 
-    # Those that any run may start from.
-    known = {scene.name: scene for scene in (*SCENES, *further_scenes(motions.first_garment))} | dict(scenes)
-    settling = [name for name, scene in known.items() if scene.simulated and not scene.start_of]
-    for scene in (scene for scene in scenes.values() if scene.declared_in):
-        for field, asked, names in (
-            ("start_of", bool(scene.start_of), settling),
-            ("motion", scene.dressed, [*motions.files, *LIBRARY]),
-        ):
-            if asked and (word := getattr(scene, field)) not in names:
+    starts = (*further_scenes(motions.first_garment), *scenes)
+    settling = [scene.name for scene in starts if scene.simulated and not scene.start_of]
+    for scene in (scene for scene in scenes if scene.declared_in):
+        for field, names in (("start_of", settling), ("motion", [*motions.files, *LIBRARY])):
+            if (word := getattr(scene, field)) not in ("", *names):
                 what = f"{scene.declared_in}: scene '{scene.name}': {field}='{word}'"
                 raise StudyError(f"{what}: nothing that serves is called so; {nearest(word, names)}")
 
@@ -214,16 +209,16 @@ def roll_out_cells(study: Study, cells: Sequence[Cell], methods: Mapping[str, Me
         return []
     from benchmarks.methods.outside import entry_of  # loads numpy
 
-    scenes = {cell.scene.name: cell.scene for cell in cells if not cell.scene.networks_only}
-    suites = {
-        name: dict.fromkeys(suite for cell in cells if cell.scene.name == name for suite in cell.suites)
-        for name in scenes
-    }
+    scenes: dict[str, Scene] = {}
+    suites: dict[str, dict[str, None]] = {}
+    for cell in (cell for cell in cells if not cell.scene.networks_only):
+        scenes[cell.scene.name] = cell.scene
+        suites.setdefault(cell.scene.name, {}).update(dict.fromkeys(cell.suites))
     stored: list[Cell] = []
     for option in study.rollouts.values():
         what = f"{option.name}={option.path}"
         if option.name in methods:
-            raise StudyError(f"{what}: a method is called {option.name}: give another name, as in NAME=FILE")
+            raise StudyError(f"{what}: a method is called {option.name}: give another name")
         if len(scenes) != 1 and PLACE not in option.path:
             raise StudyError(
                 f"{what}: is of one scene, and {len(scenes)} are asked for: name it with --scenes, or put "

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 
 from benchmarks.assets import read_inputs
 from benchmarks.declarations import by_name
@@ -33,24 +34,20 @@ def make_plan(
     study: Study,
     *,
     folder: Path | None = None,
-    retry: bool = False,
-    fresh: bool = False,
     workers: int | None = None,
     scheduler: str = "",
-    command: str = "",
     scenes: Sequence[Scene] = (),
+    **further: Any,
 ) -> Plan:
     """Return the plan of a study: cells, cases, motions and a user's inputs as read.
 
     Args:
         study: what is asked.
         folder: of the run; None: a new one.
-        retry: whether tasks that failed there are done again.
-        fresh: whether nothing of the folder is reused.
         workers: processes side by side; None: as many as usual.
         scheduler: address of a cluster; empty: this machine.
-        command: the command line, for run.json.
         scenes: further scenes that no file declares.
+        further: other fields of Plan: retry, fresh, command.
 
     Raises:
         ValueError: one line for the first thing that cannot be met, with what there is instead. Nothing has
@@ -80,13 +77,11 @@ def make_plan(
         seeds=study.seeds,
         device=study.device,
         folder=folder,
-        retry=retry,
-        fresh=fresh,
         workers=workers,
         scheduler=scheduler,
         trained=study.trained,
-        command=command,
         study=study.written,
+        **further,
     )
 
 
@@ -104,11 +99,7 @@ def plan_scene(study: Study, name: str) -> Plan:
 
 
 def read_files(study: Study, scenes: Sequence[Scene] = ()) -> ReadStudy:
-    """Read all files of a user that a study names.
-
-    Args:
-        study: what is asked.
-        scenes: further ones that no file declares.
+    """Read all files of a user that a study names; `scenes` are further ones.
 
     Raises:
         ValueError: one line for the first file that cannot be read or named.
@@ -116,10 +107,9 @@ def read_files(study: Study, scenes: Sequence[Scene] = ()) -> ReadStudy:
     study, user_scenes, user_methods, user_cases = user_files.declarations_of(study)
     garment, self_contact = study.garment, study.self_contact
     if garment and garment.name in {name.split("/")[0] for name in all_scenes("-", "-")}:
-        what = f"garment {garment.path}: the project has scenes of that name"
-        raise StudyError(f"{what}: give the file another name")
+        raise StudyError(f"{garment.path}: the project has scenes of that name: give the file another name")
     if self_contact and not installed("ipctk"):
-        raise StudyError(f"{study.place('self_contact')}: needs the package ipctk: pip install ipctk")
+        study.refuse("needs the package ipctk: pip install ipctk", "self_contact")
     inputs = read_inputs(study.body, garment, study.motions, study.motion_files)
     motions = split_motions(study, inputs.motions)
     of_file = [GarmentScenes(garment.name, f"a garment of {garment.path.name}")] if garment else []
@@ -141,8 +131,7 @@ def choose_metrics(study: Study) -> tuple[str, ...]:
     """Return the modules of metrics that are not the project's. Raises ValueError."""
     names, metrics = user_files.resolve(user_files.METRICS, study.metrics)
     for name in set(names) - {metric.name for metric in metrics}:
-        what = f"{study.place('metrics')}: {name}: is no file"
-        raise StudyError(f"{what}; those of the project are measured without it")
+        study.refuse(f"{name}: is no file; those of the project are measured without it", "metrics")
     homes = tuple(dict.fromkeys(metric.declared_in for metric in metrics))
     declared(homes)  # each name stands once
     return homes
@@ -157,15 +146,14 @@ def check_machines(study: Study, folder: Path, scheduler: str) -> None:
         from snug.training.device import find_device  # loads torch
 
         find_device(study.device)
-    trained, place = study.trained, f"{study.place('trained')} {study.trained}"
+    trained = study.trained
     if trained and not trained.is_dir():
-        raise StudyError(f"{place}: no such folder; without DIR the package's are taken")
+        study.refuse(f"{trained}: no such folder; without DIR the package's are taken", "trained")
     if trained and trained.resolve() == folder.resolve():  # where networks of another training are removed
-        raise StudyError(f"{place}: the folder of this run itself: give another by --out")
+        study.refuse(f"{trained}: the folder of this run itself: give another by --out", "trained")
     for field, given in (("rollouts", study.rollouts), ("trained", trained), ("device", study.device)):
         if scheduler and given and given != "cpu":
-            what = f"{study.place(field)}: a cluster has the cpu, and no file of this machine"
-            raise StudyError(f"{what}; leave out --scheduler")
+            study.refuse("a cluster has the cpu, and no file of this machine; leave out --scheduler", field)
 
 
 def choose_folder(folder: Path | None) -> Path:
@@ -175,10 +163,7 @@ def choose_folder(folder: Path | None) -> Path:
         StudyError: where it cannot be made, or holds other things.
     """
     if folder is None:
-        root = Path("reports") / "runs"
-        stamp = datetime.now().strftime("%Y-%m-%d_%H-%M-%S")
-        candidates = [root / stamp, *(root / f"{stamp}-{n}" for n in range(2, 100))]
-        folder = next(path for path in candidates if not path.exists())
+        folder = Path("reports", "runs", datetime.now().strftime("%Y-%m-%d_%H-%M-%S"))
     elif folder.exists() and not folder.is_dir():
         raise StudyError(f"--out {folder}: is a file; name a folder")
     elif RunFolder(folder).config_path.is_file():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from benchmarks.plan.study import Study, StudyError, nearest
+from benchmarks.plan.study import Study, nearest
 from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, of_garment
 from snug.motion.library import DYNAMIC_TEST, DYNAMIC_VALIDATION, LIBRARY, TEST, TRAIN, VALIDATION, clip_of
 
@@ -64,13 +64,10 @@ class Motions:
 
 
 def split_motions(study: Study, files: Collection[str] = ()) -> Motions:
-    """Return which motions train, validate and test.
+    """Return which motions train, validate and test; `files` are those of a user's files.
 
-    Args:
-        study: names of those that test and validate; without any, those of the library do, and of files alone
-            the first in the order of names tests. The library takes part where it is named among the motions,
-            or where no file is. Its sizes say how many motions of the library each role has.
-        files: names of the motions of a user's files.
+    Where the study names none, those of the library test and validate, and of files alone the first in the
+    order of names tests. The library takes part where it is named among the motions, or where no file is.
 
     Validation and test motions of the library never train, and its test motions never validate: where a part
     of a recorded clip is measured, no other part of that clip trains. Where nothing is left to train on, the
@@ -87,11 +84,10 @@ def split_motions(study: Study, files: Collection[str] = ()) -> Motions:
     roles: dict[str, tuple[str, ...]] = {}
     for role, chosen in (("test", study.test_motions), ("validation", study.validation_motions)):
         for name in chosen:
-            place = study.place(f"{role}_motions")
             if name not in names:
-                raise StudyError(f"{place}: unknown motion '{name}'; {nearest(name, names)}")
+                study.refuse(f"unknown motion '{name}'; {nearest(name, names)}", f"{role}_motions")
             if role == "validation" and clip_of(name) in tested:
-                raise StudyError(f"{place}: '{name}' is a test motion; choose others")
+                study.refuse(f"'{name}' is a test motion; choose others", f"{role}_motions")
         roles[role] = tuple(name for name in names if name in chosen)
     test, validation = roles["test"], roles["validation"]
     if library:
@@ -106,6 +102,5 @@ def split_motions(study: Study, files: Collection[str] = ()) -> Motions:
     few = None if getattr(study, f"{split}_motions") else sizes.test_motions
     motions = Motions(train[: sizes.train_motions], test, validation, tuple(files), split=split, few=few)
     if not motions.measured:
-        place = study.place("split")
-        raise StudyError(f"{place}: no motion has this role; name some by {split}_motions")
+        study.refuse(f"no motion has this role; name some by {split}_motions", "split")
     return motions

@@ -26,15 +26,9 @@ EXAMPLES = """examples:
   python -m benchmarks.run smoke                              everything once, tiny, about 2 minutes
   python -m benchmarks.run full:garments -o reports/runs/mine       one part of a study
   python -m benchmarks.run ./mine.toml --set sizes.frames=60        a study of your own (docs/run.md)
-  python -m benchmarks.run full:speed --scenes hanging_sheet --methods simulation,newton-4
-  python -m benchmarks.run --scenes 'tshirt/*' --methods snug,skinning,simulation --seeds 0,1,2
-  python -m benchmarks.run --methods ./mine.py,snug,simulation --set metrics=./my_metric.py
-  python -m benchmarks.run --motions clips/ --test-motions 01_01
-  python -m benchmarks.run -o reports/runs/mine --dry-run     what is finished there, what would be run
-  python -m benchmarks.run --motions mocap.bvh,up=z,repair
+  python -m benchmarks.run --scenes 'tshirt/*' --methods ./mine.py,snug,simulation --seeds 0,1,2
+  python -m benchmarks.run --motions mocap.bvh,up=z,repair --garment shirt.obj,units=cm --body mine.npz
   python -m benchmarks.run --scenes tshirt/kick --methods simulation,skinning --rollout mine=out.npz,ms=2.2
-  python -m benchmarks.run --seeds 0,1,2 --scheduler tcp://10.0.0.1:8786
-  python -m benchmarks.run full:garments --garment shirt.obj,units=cm --body mine.npz
 
 a folder that holds a run is gone on with: what is finished there for the same inputs and code is taken
   as it is, the rest is done. A run that was killed is so taken up again. --retry does again what failed,
@@ -105,9 +99,8 @@ def add_study_options(parser: argparse.ArgumentParser, short: Sequence[str] = OF
     for field in short:
         more: dict[str, Any] = {} if field in SINGLE else {"action": "append", "default": []}
         more |= {"nargs": "?", "const": True} if field == "trained" else {}
-        parser.add_argument(
-            _label(field), dest=field, metavar=SHORT[field], help=f"field {field}: {texts[field]}", **more
-        )
+        more |= {"metavar": SHORT[field], "help": f"field {field}: {texts[field]}"}
+        parser.add_argument(_label(field), dest=field, **more)
 
 
 def _label(field: str) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cache
 from pathlib import Path
@@ -62,8 +62,8 @@ class Plan:
     the folder holds is forgotten first. workers: processes side by side where nothing is timed.
     metrics: modules of metrics that are not the project's, see benchmarks.plan.user_files. scheduler: address
     of a cluster that does what is not timed; empty: this machine does. trained: folder whose networks take
-    the place of trainings; None: networks are trained. study: what was asked, as written. Raises StudyError,
-    see check_names.
+    the place of trainings; None: networks are trained. study: what was asked, as written. Raises StudyError
+    where two cells have the files of one: slashes of names become hyphens there.
     """
 
     preset: Preset
@@ -85,7 +85,10 @@ class Plan:
     study: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        check_names(self.cells)
+        cell_of: dict[str, Cell] = {}
+        for cell in self.cells:
+            if (other := cell_of.setdefault(cell.name, cell)) is not cell:
+                raise StudyError(f"{cell.label} and {other.label} would have the same files: rename one")
 
     @property
     def scenes(self) -> tuple[Scene, ...]:
@@ -116,23 +119,15 @@ class Plan:
         """Make body, garments and motions of the scenes. Raises ValueError where one cannot be made."""
         from benchmarks.assets import embedded_motions, open_assets  # loads numpy
 
-        names: list[str] = []
         read, train = self.inputs.motions, self.motions.train
+        names = [scene.motion for scene in self.scenes if scene.dressed]
         for garment in self.garments:
             names += self.motions.measured_of(garment)
-            names += [scene.motion for scene in self.scenes if scene.garment == garment]
-        names = list(dict.fromkeys((*names, *(train if self.networks else ()))))
-        motions = [read[name] for name in names if name in read]
-        motions += embedded_motions(name for name in names if name not in read)
+        names += train if self.networks else ()
+        wanted = dict.fromkeys(names)
+        motions = [read[name] for name in wanted if name in read]
+        motions += embedded_motions(name for name in wanted if name not in read)
         return open_assets(self.preset, motions, self.garments, inputs=self.inputs, training=train)
-
-
-def check_names(cells: Sequence[Cell]) -> None:
-    """Raise StudyError where two cells have the files of one: slashes of names become hyphens there."""
-    cell_of: dict[str, Cell] = {}
-    for cell in cells:
-        if (other := cell_of.setdefault(cell.name, cell)) is not cell:
-            raise StudyError(f"{cell.label} and {other.label} would have the same files: rename one")
 
 
 def runs(cell: Cell) -> bool:
@@ -162,7 +157,12 @@ def protocol_of(cell: Cell, plan: Plan) -> str:
     if any(c.entry.role == "reference" and c.entry.module == STORED for c in plan.cells if c.scene == scene):
         return OWN
     network = network_of(cell)
-    return NUMBER if network is None or network.users_training or _trains_as_declared(plan) else OWN
+    if network is None or network.users_training:
+        return NUMBER
+    from snug.motion.library import TRAIN
+
+    trained_on = TRAIN[: plan.preset.train_motions]
+    return NUMBER if plan.motions.train == trained_on and not inputs.motions else OWN
 
 
 def protocol_of_case(scene: str, metric: str) -> str:
@@ -177,19 +177,11 @@ def _places() -> frozenset[Any]:
     return frozenset({case.name for case in CASES} | {(case.scene, case.metric) for case in CASES})
 
 
-@cache
-def _declared_with(motion: str) -> dict[str, Scene]:
-    motions = (motion,) * bool(motion)
-    return all_scenes(motions, motions)
+_declared_with = cache(all_scenes)  # motions and swinging motions
 
 
 def _is_declared(scene: Scene, preset: str) -> bool:
     """Return whether the project declares the scene so; a run may leave out what is measured in it."""
-    declared = _declared_with(scene.motion).get(scene.name)
+    motions = (scene.motion,) * bool(scene.motion)
+    declared = _declared_with(motions, motions).get(scene.name)
     return declared is not None and replace(declared.at(find_preset(preset)), metrics=scene.metrics) == scene
-
-
-def _trains_as_declared(plan: Plan) -> bool:
-    from snug.motion.library import TRAIN
-
-    return plan.motions.train == TRAIN[: plan.preset.train_motions] and not plan.inputs.motions

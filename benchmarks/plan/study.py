@@ -6,10 +6,9 @@ Every field is an attribute of a dataclass, whose type says what it takes.
 from __future__ import annotations
 
 import difflib
-import re
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass, replace
+from dataclasses import asdict, dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from types import UnionType
 from typing import Any, Literal, NoReturn, TypeVar, get_args, get_origin, get_type_hints
@@ -24,14 +23,7 @@ PARTS = ("garments", "speed", "validation", "extremes", "shapes")  # that report
 
 
 class StudyError(ValueError):
-    """A field of a study that cannot be meant; the message names its place and what there is instead.
-
-    field: where it was found by the study itself, before its place is known.
-    """
-
-    def __init__(self, message: str, field: tuple[str, ...] = ()) -> None:
-        super().__init__(message)
-        self.field = field
+    """A field of a study that cannot be meant; the message names its place and what there is instead."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,21 +121,26 @@ class Study:
     written: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
     origin: Callable[[tuple[str, ...]], str] = field(default=".".join, repr=False, compare=False)
 
-    def __post_init__(self) -> None:
+    def place(self, *field: str) -> str:
+        """Return where a field was said: a file and the field, or an option."""
+        return self.origin(field)
+
+    def refuse(self, message: str, *field: str) -> NoReturn:
+        """Raise StudyError with the place of the field."""
+        raise StudyError(f"{self.place(*field)}: {message}")
+
+    def check(self) -> None:
+        """Raise StudyError for numbers and names that no type refuses."""
         if not self.seeds or min(self.seeds) < 0 or max(self.seeds) >= 1 << 63:
             given = ",".join(map(str, self.seeds))[:40]
             wanted = "at least one whole number, none below 0 or beyond 63 bits"
-            raise StudyError(f"'{given}': give {wanted}", ("seeds",))
+            self.refuse(f"'{given}': give {wanted}", "seeds")
         if self.sizes.frames < FEWEST_FRAMES:
-            raise StudyError(f"{self.sizes.frames}: give {FEWEST_FRAMES} or more", ("sizes", "frames"))
+            self.refuse(f"{self.sizes.frames}: give {FEWEST_FRAMES} or more", "sizes", "frames")
         for name in self.parts:
             if name not in PARTS and not self.parts[name].question:
                 known = f"no part is called so; choose from {', '.join(PARTS)}, or give it a question"
-                raise StudyError(known, ("parts", name))
-
-    def place(self, *field: str) -> str:
-        """Return where a field was said: a file, its line and the field; or an option."""
-        return self.origin(field)
+                self.refuse(known, "parts", name)
 
 
 def nearest(word: str, names: Sequence[str], otherwise: str = "see --list") -> str:
@@ -160,19 +157,20 @@ HIDDEN = {  # attributes that no file gives
 }  # fmt: skip
 WORDS_FOR_TABLES = {"garment": "path", "sizes": "base"}  # table -> the field that a word in its place means
 KINDS = {str: "text", int: "a whole number", float: "a number", bool: "true or false"}
-LINE = re.compile(r"\s*(?:\[([^\[\]]+)\]\s*(?:#.*)?$|([\w.\"'-]+)\s*=)")  # a table, or a field of it
 Field = tuple[str, ...]
 Record = TypeVar("Record")
 
 
 @dataclass(frozen=True)
 class Layer:
-    """Fields of one place: a file, or an option, whose label it has. The first that has a field decides."""
+    """Fields of one place: a file, or an option. The first that has a field decides.
+
+    folder: of the file, to which its paths are relative; None of an option.
+    """
 
     label: str
     table: dict[str, Any]
-    text: str = ""
-    folder: Path = Path()
+    folder: Path | None = None
 
     def has(self, field: Field) -> bool:
         """Return whether the field stands here."""
@@ -193,7 +191,7 @@ def read_study(word: str = "default", options: Sequence[Layer] = ()) -> Study:
         options: later ones hold before earlier ones.
 
     Raises:
-        StudyError: no such study, or a field that cannot be meant: file, line, field, and what is near it.
+        StudyError: no such study, or a field that cannot be meant: its place, and what is near it.
 
     >>> read_study("full:speed", [option("--seeds", "seeds", [1, 2])]).seeds
     (1, 2)
@@ -212,11 +210,13 @@ def read_study(word: str = "default", options: Sequence[Layer] = ()) -> Study:
         merged["parts"] = {part: parts[part] for part in parts if part in names}
     reader = _Reader(layers)
     study: Study = reader.dataclass_of(Study, merged, ())
-    return replace(study, written={"name": word, **merged}, origin=reader.place)
+    study = replace(study, written={"name": word, **merged}, origin=reader.place)
+    study.check()
+    return study
 
 
 def read_fields(kind: type[Record], path: Path) -> Record:
-    """Return an object of a dataclass from a TOML file. Raises StudyError with file, line and field."""
+    """Return an object of a dataclass from a TOML file. Raises StudyError with file and field."""
     layer = replace(next(_layers(path)), folder=Path())
     record: Record = _Reader([layer]).dataclass_of(kind, layer.table, ())
     return record
@@ -244,7 +244,7 @@ def study_names() -> list[str]:
 def option(label: str, field: str, value: Any) -> Layer:
     """Return the layer of an option that gives one field, dotted where it is one of a table."""
     table = value
-    for name in reversed(_names(field)):
+    for name in reversed(field.split(".")):
         table = {name: table}
     return Layer(label, _with_tables(table))
 
@@ -275,12 +275,10 @@ def _layers(path: Path) -> Iterator[Layer]:
     while path not in seen:
         seen.append(path)
         try:
-            text = path.read_text(encoding="utf-8")
-            table = tomllib.loads(text)
+            table = tomllib.loads(path.read_text(encoding="utf-8"))
         except (OSError, ValueError) as error:
             raise StudyError(f"{path}: not readable as TOML ({' '.join(str(error).split())})") from None
-        folder = Path() if path.parent == PACKAGED else path.parent
-        yield Layer(str(path), _with_tables(table), text, folder)
+        yield Layer(str(path), _with_tables(table), Path() if path.parent == PACKAGED else path.parent)
         if "like" not in table:
             return
         like = str(table["like"])
@@ -300,33 +298,11 @@ def _with_tables(table: dict[str, Any]) -> dict[str, Any]:
 
 def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of both; tables are joined, all else is that of `above`."""
-    both = {
-        name for name in above if isinstance(below.get(name), Mapping) and isinstance(above[name], Mapping)
-    }
-    return {**below, **above, **{name: _merged(below[name], above[name]) for name in both}}
-
-
-def _names(dotted: str) -> list[str]:
-    return [name.strip("\"'") for name in re.findall(r"\"[^\"]*\"|'[^']*'|[^.\s]+", dotted)]
-
-
-def line_of(text: str, field: Field) -> int:
-    r"""Return the number of the line that gives a field, or else the table that it belongs to.
-
-    >>> line_of("[sizes]\nframes = 2", ("sizes", "frames"))
-    2
-    """
-    header: list[str] = []
-    best, line = 0, 1
-    for number, words in enumerate(text.splitlines(), 1):
-        if not (match := LINE.match(words)):
-            continue
-        table, key = match.groups(default="")
-        header = _names(table) if table else header
-        name = [*header, *_names(key)]
-        if len(name) > best and tuple(name) == field[: len(name)]:
-            best, line = len(name), number
-    return line
+    merged = {**below, **above}
+    for name, value in above.items():
+        if isinstance(value, Mapping) and isinstance(below.get(name), Mapping):
+            merged[name] = _merged(below[name], value)
+    return merged
 
 
 class _Reader:
@@ -342,41 +318,35 @@ class _Reader:
     def place(self, field: Field) -> str:
         """Return where a field was said."""
         layer = self.layer(field)
-        line = f": line {line_of(layer.text, field)}: {'.'.join(field)}"
-        return f"{layer.label}{line if layer.text else ''}"
+        return layer.label if layer.folder is None else f"{layer.label}: {'.'.join(field)}"
+
+    def path(self, field: Field, name: str) -> Path:
+        """Return a path; those of a file are relative to its folder."""
+        return (self.layer(field).folder or Path()) / name
 
     def refuse(self, field: Field, message: str) -> NoReturn:
         """Raise StudyError with the place."""
         raise StudyError(f"{self.place(field)}: {message}")
 
-    def checked(self, field: Field, make: Callable[..., Any], *given: Any, **named: Any) -> Any:
-        """Return what `make` makes; what it refuses gets its place."""
-        try:
-            return make(*given, **named)
-        except ValueError as error:
-            self.refuse((*field, *getattr(error, "field", ())), str(error))
-
     def dataclass_of(self, kind: Any, table: Any, field: Field) -> Any:
-        """Return an object of a dataclass from the table of its fields."""
+        """Return an object of a dataclass from the table of its fields; what it refuses gets its place."""
         table = self.table(table, field)
         if kind is RollOutOption:
-            path = self.layer(field).folder / str(table.get("path", ""))
-            table |= {"name": field[-1], "path": str(path)}
-        if kind is Preset:  # changes to the sizes that `base` names
-            base = asdict(self.checked((*field, "base"), find_preset, table.pop("base", "quick")))
-        declared = {f.name: f for f in fields(kind) if f.name not in HIDDEN.get(kind, ())}
+            table |= {"name": field[-1], "path": str(self.path(field, str(table.get("path", ""))))}
+        base = table.pop("base", "quick") if kind is Preset else ""
+        declared = [f.name for f in fields(kind) if f.name not in HIDDEN.get(kind, ())]
         for name in table:
             if name not in declared:
-                near = nearest(name, list(declared), otherwise=f"there are {', '.join(declared)}")
+                near = nearest(name, declared, otherwise=f"there are {', '.join(declared)}")
                 self.refuse((*field, name), f"no field is called '{name}'; {near}")
-        if kind is Preset:
-            table = _merged(base, table)
-        for name, f in declared.items():
-            if f.default is MISSING and f.default_factory is MISSING and name not in table:
-                self.refuse(field, f"{name} is absent: give it")
         hints = get_type_hints(kind)
-        values = {name: self.value(hints[name], value, (*field, name)) for name, value in table.items()}
-        return self.checked(field, kind, **values)
+        try:
+            table = _merged(asdict(find_preset(base)), table) if base else table
+            return kind(**{name: self.value(hints[name], table[name], (*field, name)) for name in table})
+        except StudyError:
+            raise
+        except (TypeError, ValueError) as error:
+            self.refuse(field, str(error))
 
     def table(self, value: Any, field: Field) -> dict[str, Any]:
         """Return a copy of a table."""
@@ -389,9 +359,11 @@ class _Reader:
         origin, types = get_origin(hint), get_args(hint)
         if origin is UnionType:  # of a type and None
             return None if value is None else self.value(types[0], value, field)
+        if field == ("trained",) and isinstance(value, bool):
+            return FOLDER if value else None
         if origin is Literal:
             if value not in types:
-                self.refuse(field, f"{value!r}: choose from {', '.join(filter(None, types))}")
+                self.refuse(field, f"{value!r}: choose from {', '.join(types)}")
             return value
         if origin is tuple:
             values = value if isinstance(value, list | tuple) else [value]
@@ -401,16 +373,11 @@ class _Reader:
             return {name: self.value(types[1], v, (*field, name)) for name, v in table.items()}
         if is_dataclass(hint):
             return self.dataclass_of(hint, value, field)
-        return self.word(hint, value, field)
-
-    def word(self, kind: Any, value: Any, field: Field) -> Any:
-        """Return a number, a text or a path; paths of a file are relative to its folder."""
-        if field == ("trained",) and isinstance(value, bool):
-            return FOLDER if value else None
-        if kind is float and type(value) is int:
+        if hint is float and type(value) is int:
             return float(value)
-        if type(value) is not (str if kind is Path else kind) or (kind is Path and not value):
-            self.refuse(field, f"{value!r}: give {KINDS.get(kind, 'a path')}")
-        folder = self.layer(field).folder
-        file = kind is str and (value.endswith(".py") or (field == ("motions",) and value != LIBRARY))
-        return folder / value if kind is Path else str(folder / value) if file else value
+        if type(value) is not (str if hint is Path else hint) or (hint is Path and not value):
+            self.refuse(field, f"{value!r}: give {KINDS.get(hint, 'a path')}")
+        if hint is Path:
+            return self.path(field, value)
+        file = hint is str and (value.endswith(".py") or (field == ("motions",) and value != LIBRARY))
+        return str(self.path(field, value)) if file else value

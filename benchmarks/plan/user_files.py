@@ -68,11 +68,11 @@ def declarations_of(study: Study) -> tuple[Study, list[Scene], list[MethodEntry]
 
     def named(of: Study | Part, suite: str = "") -> Any:
         changes: dict[str, Any] = {}
-        for field, kind in OF_FIELD.items():
-            changes[field], entries = resolve(kind, getattr(of, field, ()))
+        for field, kind in ((field, kind) for field, kind in OF_FIELD.items() if hasattr(of, field)):
+            changes[field], entries = resolve(kind, getattr(of, field))
             entries = [replace(case, suite=suite) for case in entries] if kind is CASES else entries
             found[kind] += [entry for entry in entries if entry not in found[kind]]
-        return replace(of, **{field: names for field, names in changes.items() if hasattr(of, field)})
+        return replace(of, **changes)
 
     parts = {name: named(part, name) for name, part in study.parts.items()}
     study = replace(named(study), parts=parts)
@@ -105,17 +105,16 @@ def entries_of(kind: Kind, home: str) -> list[Any]:
         _demand(cases, f"{home}: declares no known answer, a function with @known_answer")
         return [replace(case, module=home) for case in cases]
     declared = getattr(module, kind.tuple_name, None)
-    if not isinstance(declared, tuple | list) or not all(isinstance(entry, kind.entry) for entry in declared):
+    meant = declared and isinstance(declared, tuple | list)
+    if not (meant and all(isinstance(entry, kind.entry) for entry in declared)):
         raise DeclarationError(f"{home}: declares no {kind.tuple_name}, a tuple of {kind.entry.__name__}")
-    _demand(declared, f"{home}: {kind.tuple_name} is empty")
     by_name(kind.word[:-1], declared)
-    has_function = callable(getattr(module, kind.function, None))
     if kind is METRICS:
-        _demand(has_function, f"{home}: has no function {kind.function}")
-        return [replace(entry, declared_in=home) for entry in declared]
-    entries = [_placed(kind, entry, home) for entry in declared]
-    _demand(has_function or home not in {entry.module for entry in entries},
-            f"{home}: has no function {kind.function}")  # fmt: skip
+        entries = [replace(entry, declared_in=home) for entry in declared]
+    else:
+        entries = [_placed(kind, entry, home) for entry in declared]
+    needs_function = home in {getattr(entry, "module", home) for entry in entries}
+    _demand(not needs_function or hasattr(module, kind.function), f"{home}: has no function {kind.function}")
     return entries
 
 
@@ -125,14 +124,11 @@ def _placed(kind: Kind, entry: Any, home: str) -> Any:
     _demand(NAME.fullmatch(entry.name),
             f"{what}: name it by at most 150 letters, digits and _ + - . / @ :, not 'body'")  # fmt: skip
     for field in ("files", "sizes", "metrics"):
-        names = getattr(entry, field, None) or ()
-        listed = isinstance(names, tuple | list) and all(isinstance(name, str) for name in names)
-        _demand(listed, f"{what}: {field}={names!r}: give a tuple of strings")
+        names = getattr(entry, field, None)
+        _demand(not isinstance(names, str), f"{what}: {field}={names!r}: give a tuple of strings")
     measured, known = getattr(entry, "metrics", None) or (), [m.name for m in MEASUREMENTS]
     _demand({*measured} <= {*known}, f"{what}: metrics={measured!r}: choose from {', '.join(known)}")
-    files = tuple(str((folder / name).resolve()) for name in entry.files)
-    for file in files:
-        _demand(Path(file).is_file(), f"{what}: {file}: no such file")
+    files = tuple(map(file_of, (str(folder / name) for name in entry.files)))
     source = entry.module or home
     source = str((folder / source).resolve()) if source.endswith(".py") else source
     try:

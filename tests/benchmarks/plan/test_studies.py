@@ -7,8 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.plan.options import OF_SCENES, SHORT
-from benchmarks.plan.study import Study, line_of, parse_setting, read_study, study_names
+from benchmarks.plan.study import parse_setting, read_study, study_names
 from benchmarks.presets import find_preset
 from benchmarks.publish import published_studies
 from reports.blocks import FIGURES
@@ -75,12 +74,10 @@ def test_options_hold_before_the_file_and_their_paths_are_relative_to_where_one_
     ("text", "table"),
     [
         ("seeds=0,1", {"seeds": [0, 1]}),
-        ("split=validation", {"split": "validation"}),
         ("test_motions=a,b", {"test_motions": ["a", "b"]}),
         ("sizes=smoke", {"sizes": {"base": "smoke"}}),
         ('parts.speed.scenes=["flag"]', {"parts": {"speed": {"scenes": ["flag"]}}}),
         ("rollouts.mine=a.npz", {"rollouts": {"mine": {"path": "a.npz"}}}),
-        ("self_contact=true", {"self_contact": True}),
         ("motions=clips/a b", {"motions": "clips/a b"}),
     ],
 )
@@ -88,17 +85,7 @@ def test_a_setting_is_a_field_and_a_value_of_toml_or_a_word(text, table):
     assert parse_setting(text).table == table
 
 
-def test_lines_of_fields_are_those_of_their_tables():
-    field = ("parts", "speed", "methods")
-    assert line_of("a = 1\n[parts.speed]\n\nmethods = 1", field) == 4
-    assert line_of("[parts]\nspeed = { methods = 1 }", field) == 2
-    assert line_of('[show]\nfilms."a.gif" = 1', ("show", "films", "a.gif")) == 2
-
-
-def test_short_forms_are_fields_and_every_field_is_described():
-    from benchmarks.declarations import attributes_of
-
-    assert set(OF_SCENES) < set(SHORT) <= set(attributes_of(Study))
+def test_trained_true_means_the_networks_of_the_package():
     assert study_with(trained=True).trained == FOLDER and study_with(trained=False).trained is None
 
 
