@@ -18,9 +18,7 @@ GARMENT_WORDS = """behind the path of a garment, as in shirt.obj,units=cm,up=z: 
 up (y, z), shift='0 0.1 0' [m] where the body stood elsewhere, rest=uv where the UV chart is the pattern,
 uv_scale (metres per unit of the chart), material (.toml of young_modulus [Pa], poisson_ratio,
 thickness [m], density [kg/m^3], bending_stiffness [J])"""
-MOTION_WORDS = """behind the path of motions, as in clips/,up=z: up (y, z), fps (of files that state none),
-repair (interpolate over recording errors: numbers that are not finite, joints faster than 3600 degrees/s, a
-root faster than 10 m/s)"""
+MOTION_WORDS = """behind the path of motions, as in clips/,up=z: up (y, z), fps (of files that state none)"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,12 +67,11 @@ class GarmentFile:
 
 @dataclass(frozen=True, kw_only=True)
 class MotionFileOptions:
-    """Facts that a motion's file does not state, and the treatment of recording errors.
+    """Facts that a motion's file does not state.
 
     Attributes:
         up: vertical axis of the file, "y" or "z"; empty: found from the motion.
         fps: frames per second of a file that states none [1/s].
-        repair: interpolate over recording errors instead of refusing them.
 
     Raises:
         ValueError: a word without sense.
@@ -82,14 +79,11 @@ class MotionFileOptions:
 
     up: str = ""
     fps: float | None = None
-    repair: bool = False
 
     def __post_init__(self) -> None:
         _demand_one_of(("", *AXES), "up", self.up)
         if self.fps is not None and not _is_number(self.fps):
             raise ValueError(f"fps={self.fps}: give a number of frames per second")
-        if self.repair not in (False, True):
-            raise ValueError(f"repair={self.repair}: say it, or leave it out")
 
 
 def _demand_one_of(known: tuple[str, ...], name: str, value: object) -> None:

@@ -27,7 +27,7 @@ EXAMPLES = """examples:
   python -m benchmarks.run full:garments -o reports/runs/mine       one part of a study
   python -m benchmarks.run ./mine.toml --set sizes.frames=60        a study of your own (docs/run.md)
   python -m benchmarks.run --scenes 'tshirt/*' --methods ./mine.py,snug,simulation --seeds 0,1,2
-  python -m benchmarks.run --motions mocap.bvh,up=z,repair --garment shirt.obj,units=cm --body mine.npz
+  python -m benchmarks.run --motions mocap.bvh,up=z --garment shirt.obj,units=cm --body mine.npz
   python -m benchmarks.run --scenes tshirt/kick --methods simulation,skinning --rollout mine=out.npz,ms=2.2
 
 a folder that holds a run is gone on with: what is finished there for the same inputs and code is taken

@@ -8,7 +8,7 @@ G_bone = G_parent C M C^-1 is its rotation in the world. Its far end lies at G_b
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -17,8 +17,8 @@ from scipy.spatial.transform import Rotation
 
 from snug.body.skeleton import LEG_LENGTH
 from snug.file_options import MotionFileOptions
-from snug.motion.motion import MotionError
-from snug.motion.raw_motion import Line, RawMotion, frame_rate, read_lines
+from snug.motion.motion import Motion, MotionError
+from snug.motion.recording import finite_numbers, frame_rate, parse_lines
 from snug.motion.retarget import FEET, HINGES, LIMBS, retarget
 
 CMU_RATE = 120.0  # [1/s] the .amc format has no field for it
@@ -53,8 +53,8 @@ class Bone:
     parent: str = ""
 
 
-def read_asf_amc(path: Path, options: MotionFileOptions) -> RawMotion:
-    """Read an .amc with the .asf of its subject (01_05.amc: 01.asf, or 01_05.asf).
+def read_asf_amc(path: Path, options: MotionFileOptions) -> Motion:
+    """Read an .amc with the .asf of its subject (01_05.amc: 01.asf, or 01_05.asf), in the file's axes.
 
     The path is scaled by the ratio of leg lengths, so that steps and legs agree.
 
@@ -65,25 +65,27 @@ def read_asf_amc(path: Path, options: MotionFileOptions) -> RawMotion:
     candidates = [path.with_name(name + end) for name in names for end in (".asf", ".ASF")]
     file = next((file for file in candidates if file.is_file()), None)
     if file is None:
-        raise MotionError(f"{path}: its skeleton {names[1]}.asf is missing; put it beside the clip")
-    bones, metres = read_asf(file)
+        raise MotionError(f"its skeleton {names[1]}.asf is missing; put it beside the clip")
+    try:
+        bones, metres = read_asf(file)
+    except MotionError as error:
+        raise MotionError(f"its skeleton {file.name}, {error}") from None
     if missing := [bone for bone in JOINT_BONES.values() if bone not in bones]:
-        raise MotionError(f"{file}: no bone '{missing[0]}'; only skeletons with CMU's bone names are read")
+        raise MotionError(f"{file.name} has no bone '{missing[0]}'; only CMU's bone names are read")
     leg = bones["lfemur"].length + bones["ltibia"].length
     if leg <= 0.0:
-        raise MotionError(f"{file}: the left leg has no length; fetch the skeleton again")
+        raise MotionError(f"the left leg of {file.name} has no length; fetch the skeleton again")
     channels = read_amc(path, bones, metres)
-    fps = frame_rate(path, len(channels["root"]), None, options, CMU_RATE)
     turned = world_turns(bones, channels)
     poses = retarget(
-        file,
         {joint: turned[bone] for joint, bone in JOINT_BONES.items()},
         {joint: bones[JOINT_BONES[joint]].direction for joint in LIMBS | FEET},
         {joint: bones[JOINT_BONES[joint]].axes[:, 0] for joint in HINGES},
     )
     root = channels["root"][:, [bones["root"].channels.index(axis) for axis in TRANSLATIONS]]
+    fps = frame_rate(len(root), None, options.fps, CMU_RATE)
     source = f"{path.name} with {file.name}"
-    return RawMotion(path=path, poses=poses, translations=LEG_LENGTH / leg * root, fps=fps, source=source)
+    return Motion(path.stem, poses, LEG_LENGTH / leg * root, fps, "recorded", source)
 
 
 def world_turns(bones: dict[str, Bone], channels: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
@@ -113,90 +115,87 @@ def read_asf(path: Path) -> tuple[dict[str, Bone], float]:
         The bones by name, parents first, and the length [m] of the file's unit.
 
     Raises:
-        MotionError: file and line.
+        MotionError: names the line.
     """
+    return parse_lines(path, _parse_bones, comment="#")
+
+
+def _parse_bones(lines: Iterator[list[str]]) -> tuple[dict[str, Bone], float]:
     section, metres, bone = "", INCH, Bone()
     bones, unattached = {"root": Bone()}, dict[str, Bone]()
-    for line in read_lines(path, comment="#"):
-        word, *rest = line.tokens
-        word = word.lower()
+    for name, *words in lines:
+        word = name.lower()
         if word.startswith(":"):
             section = word
-        elif not section:
-            raise line.error("no section such as :root before this; is it an .asf file?")
+        elif (word == "angle" and words != ["deg"]) or (word == "axis" and words[-1:] != ["XYZ"]):
+            raise ValueError("only angles in degrees and axes in the order XYZ are read")
         elif section == ":units" and word == "length":
-            [unit] = line.numbers(1, 1)
+            [unit] = finite_numbers(words, 1)
             if unit <= 0:
-                raise line.error("the unit of length must be positive")
+                raise ValueError("the unit of length must be positive")
             metres = INCH / unit  # CMU's lengths times 1 / unit are inches
-        elif (word == "angle" and rest != ["deg"]) or (word == "axis" and rest[-1:] != ["XYZ"]):
-            raise line.error("only angles in degrees and axes in the order XYZ are read")
-        elif section == ":root":
-            if word == "order":
-                bones["root"].channels = _channels(line, TRANSLATIONS + ROTATIONS)
-            elif word in ("position", "orientation") and any(line.numbers(1, 3)):
-                raise line.error("only roots at the origin and without a turn are read")
+        elif section == ":root" and word == "order":
+            bones["root"].channels = _channels(words, TRANSLATIONS + ROTATIONS)
+        elif section == ":root" and word in ("position", "orientation"):
+            if any(finite_numbers(words, 3)):
+                raise ValueError("only roots at the origin and without a turn are read")
         elif section == ":bonedata" and word == "name":
-            bone = unattached.setdefault(" ".join(rest), Bone())
-        elif section == ":bonedata":
-            _describe(bone, word, line, metres)
+            bone = unattached.setdefault(" ".join(words), Bone())
+        elif section == ":bonedata" and word == "direction":
+            direction = np.array(finite_numbers(words, 3))
+            length = float(np.linalg.norm(direction))
+            if not 1e-6 < length < 1e6:
+                raise ValueError("a bone's direction cannot be zero, nor so long")
+            bone.direction = direction / length
+        elif section == ":bonedata" and word == "length":
+            bone.length = finite_numbers(words, 1)[0] * metres
+        elif section == ":bonedata" and word == "axis":
+            bone.axes = product(ROTATIONS, np.radians([finite_numbers(words[:3], 3)]))[0]
+        elif section == ":bonedata" and word == "dof":
+            bone.channels = _channels(words, ROTATIONS)
         elif section == ":hierarchy" and word not in ("begin", "end"):
-            for child in rest:
-                if line.tokens[0] not in bones or child not in unattached:
-                    raise line.error(
+            for child in words:
+                if name not in bones or child not in unattached:
+                    raise ValueError(
                         f"'{child}' has no entry in :bonedata, two parents, or one not joined to the root"
                     )
                 bones[child] = unattached.pop(child)
-                bones[child].parent = line.tokens[0]
+                bones[child].parent = name
     if not set(TRANSLATIONS) <= set(bones["root"].channels):
-        raise MotionError(f"{path}: the root has no 'order' of channels with {' '.join(TRANSLATIONS)}")
+        raise ValueError(f"the root has no 'order' of channels with {' '.join(TRANSLATIONS)}")
     return bones, metres
 
 
-def _describe(bone: Bone, word: str, line: Line, metres: float) -> None:
-    """Take what a line says of a bone. Raises MotionError."""
-    if word == "direction":
-        direction = np.array(line.numbers(1, 3))
-        norm = float(np.linalg.norm(direction))
-        if not 1e-6 < norm < 1e6:
-            raise line.error("a bone's direction cannot be zero, nor so long")
-        bone.direction = direction / norm
-    elif word == "length":
-        bone.length = line.numbers(1, 1)[0] * metres
-    elif word == "axis":
-        bone.axes = product(ROTATIONS, np.radians([line.numbers(1, 3)]))[0]
-    elif word == "dof":
-        bone.channels = _channels(line, ROTATIONS)
-
-
-def _channels(line: Line, allowed: tuple[str, ...]) -> tuple[str, ...]:
-    channels = tuple(word.lower() for word in line.tokens[1:])
+def _channels(words: Sequence[str], allowed: tuple[str, ...]) -> tuple[str, ...]:
+    channels = tuple(word.lower() for word in words)
     if unknown := [channel for channel in channels if channel not in allowed]:
-        raise line.error(f"channel '{unknown[0]}' is not supported here; known are {' '.join(allowed)}")
+        raise ValueError(f"channel '{unknown[0]}' is not supported here; known are {' '.join(allowed)}")
     return channels
 
 
 def read_amc(path: Path, bones: dict[str, Bone], metres: float) -> dict[str, np.ndarray]:
     """Parse a clip: bone -> (T, channels), angles in radians, translations in metres. Raises MotionError."""
     moving = {name: len(bone.channels) for name, bone in bones.items() if bone.channels}
-    frames: list[dict[str, list[float]]] = []
-    for line in read_lines(path, comment="#"):
-        word = line.tokens[0]
-        if word.lower() == ":radians":
-            raise line.error("only angles in degrees are read")
-        if word.startswith(":"):
-            continue
-        if len(line.tokens) == 1 and word.isdigit():
-            frames.append({})
-        elif word not in moving or not frames:
-            raise line.error(f"'{word[:40]}' is no bone of the skeleton, or before the first frame")
-        else:
-            frames[-1][word] = line.numbers(1, moving[word], last=True)
+
+    def parse(lines: Iterator[list[str]]) -> list[dict[str, list[float]]]:
+        frames: list[dict[str, list[float]]] = []
+        for word, *words in lines:
+            if word.lower() == ":radians":
+                raise ValueError("only angles in degrees are read")
+            if word.startswith(":"):
+                continue
+            if not words and word.isdigit():
+                frames.append({})
+            elif word not in moving or not frames:
+                raise ValueError(f"'{word[:40]}' is no bone of the skeleton, or before the first frame")
+            else:
+                frames[-1][word] = finite_numbers(words, moving[word])
+        return frames
+
+    frames = parse_lines(path, parse, comment="#")
     for number, frame in enumerate(frames, 1):
-        if missing := [name for name in moving if name not in frame]:
-            raise MotionError(
-                f"{path}: frame {number} ends without bone '{missing[0]}'; it is cut off, fetch it again"
-            )
+        if missing := moving.keys() - frame.keys():
+            raise MotionError(f"frame {number} is cut off before bone '{min(missing)}'; fetch it again")
     channels = {}
     for name in moving:
         scale = [np.pi / 180 if channel in ROTATIONS else metres for channel in bones[name].channels]

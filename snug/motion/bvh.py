@@ -16,8 +16,8 @@ from scipy.spatial.transform import Rotation
 
 from snug.body.skeleton import LEG_LENGTH
 from snug.file_options import MotionFileOptions
-from snug.motion.motion import MotionError
-from snug.motion.raw_motion import Line, RawMotion, frame_rate, read_lines
+from snug.motion.motion import Motion, MotionError
+from snug.motion.recording import finite_numbers, frame_rate, parse_lines
 from snug.motion.retarget import FEET, LIMBS, match_joints, retarget, way_up
 
 CHANNELS = {f"{axis}{kind}".lower(): f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ"}
@@ -42,19 +42,19 @@ class Joint:
     first: int = 0
 
 
-def read_bvh(path: Path, options: MotionFileOptions) -> RawMotion:
+def read_bvh(path: Path, options: MotionFileOptions) -> Motion:
     """Read a .bvh of one body, whatever its unit of length: the path is scaled by the length of the legs.
 
     Raises MotionError.
     """
     joints, frames, stated = read_clip(path)
-    fps = frame_rate(path, len(frames), stated, options)
+    fps = frame_rate(len(frames), stated, options.fps)
     parents = [joint.parent for joint in joints]
-    matches = match_joints(path, [joint.name for joint in joints], parents)
+    matches = match_joints([joint.name for joint in joints], parents)
     places = np.zeros((len(parents), 3))
     for index, joint in enumerate(joints):
         places[index] = joint.offset + (places[joint.parent] if joint.parent >= 0 else 0.0)
-    axes, leg = _standing(path, {name: places[index] for name, index in matches.items()})
+    axes, leg = _standing({name: places[index] for name, index in matches.items()})
     places = places @ axes
     directions = {
         near: places[matches[far]] - places[matches[near]]
@@ -63,7 +63,7 @@ def read_bvh(path: Path, options: MotionFileOptions) -> RawMotion:
     }
     for ankle in FEET:
         if ankle in directions and directions[ankle][2] < -0.02 * leg:
-            raise MotionError(f"{path}: {FEET[ankle]} points backwards; are left and right exchanged?")
+            raise MotionError(f"{FEET[ankle]} points backwards; are left and right exchanged?")
     turned: dict[int, np.ndarray] = {}
     for index in sorted({above for joint in matches.values() for above in way_up(parents, joint)}):
         local = turns_of(joints[index], frames)
@@ -72,13 +72,9 @@ def read_bvh(path: Path, options: MotionFileOptions) -> RawMotion:
     pelvis = shift_of(joints[root], frames)
     for index in chain:
         pelvis = pelvis + np.einsum("tij,tj->ti", turned[parents[index]], shift_of(joints[index], frames))
-    return RawMotion(
-        path=path,
-        poses=retarget(path, {name: turned[k] @ axes for name, k in matches.items()}, directions, {}),
-        translations=LEG_LENGTH / leg * pelvis,
-        fps=fps,
-        source=f"{path.name} ({len(matches)} of 24 joints)",
-    )
+    poses = retarget({name: turned[k] @ axes for name, k in matches.items()}, directions, {})
+    source = f"{path.name} ({len(matches)} of 24 joints)"
+    return Motion(path.stem, poses, LEG_LENGTH / leg * pelvis, fps, "recorded", source)
 
 
 def turns_of(joint: Joint, frames: np.ndarray) -> np.ndarray:
@@ -100,7 +96,7 @@ def shift_of(joint: Joint, frames: np.ndarray) -> np.ndarray:
     return shift
 
 
-def _standing(path: Path, at: Mapping[str, np.ndarray]) -> tuple[np.ndarray, float]:
+def _standing(at: Mapping[str, np.ndarray]) -> tuple[np.ndarray, float]:
     """Return our axes as columns (3, 3) in the zero pose with joints `at` (3,), and the length of its leg.
 
     Up is the axis nearest to the direction from ankles to head; left leads from hip to hip. Raises
@@ -117,7 +113,7 @@ def _standing(path: Path, at: Mapping[str, np.ndarray]) -> tuple[np.ndarray, flo
     left -= up * (up @ left)
     across = float(np.linalg.norm(left))
     if not (1e-6 < leg < 1e6 and across > 1e-3 * leg and up.any()):
-        raise MotionError(f"{path}: legs or hips of its zero pose have no length; export it with offsets")
+        raise MotionError("legs or hips of its zero pose have no length; export it with offsets")
     left /= across
     return np.stack((left, up, np.cross(left, up)), axis=1), leg
 
@@ -129,63 +125,59 @@ def read_clip(path: Path) -> tuple[list[Joint], np.ndarray, float | None]:
         Joints, parents first; numbers (T, C) of each frame; frames per second [1/s] where the file states it.
 
     Raises:
-        MotionError: names the file, and the line of what is damaged or too large.
+        MotionError: names the line of what is damaged or too large.
     """
-    lines = read_lines(path)
-    _next_line(lines, path, "HIERARCHY")
-    joints = _hierarchy(lines, path)
+    return parse_lines(path, _parse)
+
+
+def _parse(lines: Iterator[list[str]]) -> tuple[list[Joint], np.ndarray, float | None]:
+    _expect(lines, "HIERARCHY")
+    joints = _hierarchy(lines)
     columns = joints[-1].first + len(joints[-1].channels)
-    _next_line(lines, path, "MOTION")
-    [declared] = _next_line(lines, path, "Frames:").numbers(1, 1, last=True)
-    [seconds] = _next_line(lines, path, "Frame", "Time:").numbers(2, 1, last=True)
-    rows = [np.array(line.numbers(0, columns, last=True)) for line in lines]
+    _expect(lines, "MOTION")
+    [declared] = finite_numbers(_expect(lines, "Frames:"), 1)
+    [seconds] = finite_numbers(_expect(lines, "Frame", "Time:"), 1)
+    rows = [np.array(finite_numbers(words, columns)) for words in lines]
     if len(rows) != declared:
-        raise MotionError(f"{path}: declares {declared:g} frames and holds {len(rows)}; export it again")
+        raise ValueError(f"declares {declared:g} frames and holds {len(rows)}")
     return joints, np.reshape(rows, (len(rows), columns)), 1.0 / seconds if seconds else None
 
 
-def _next_line(lines: Iterator[Line], path: Path, *tokens: str) -> Line:
-    """Return the next line. Raises MotionError where there is none that begins so, in any case."""
-    line = next(lines, None)
-    if line is None:
-        raise MotionError(f"{path}: ends before it is whole; export it again")
-    if [word.lower() for word in line.tokens[: len(tokens)]] != [word.lower() for word in tokens]:
-        raise line.error(
-            f"'{' '.join(line.tokens)[:40]}' where '{' '.join(tokens)}' should be; is it a .bvh file?"
-        )
-    return line
+def _expect(lines: Iterator[list[str]], *expected: str) -> list[str]:
+    """Return what follows these words, in any case, on the next line. Raises ValueError for another line."""
+    words = next(lines, [])
+    if [word.lower() for word in words[: len(expected)]] != [word.lower() for word in expected]:
+        wanted = " ".join(expected)
+        raise ValueError(f"'{' '.join(words)[:40]}' where '{wanted}' should be; is it a .bvh file?")
+    return words[len(expected) :]
 
 
-def _hierarchy(lines: Iterator[Line], path: Path) -> list[Joint]:
-    """Return the joints of the lines up to the brace that closes the root. Raises MotionError."""
+def _hierarchy(lines: Iterator[list[str]]) -> list[Joint]:
+    """Return the joints of the lines up to the brace that closes the root. Raises ValueError."""
     joints: list[Joint] = []
     open_joints: list[int] = []
-    names = {""}
     columns = 0
     while not joints or open_joints:
-        line = _next_line(lines, path)
-        word, *rest = line.tokens
+        line = next(lines, ["the end"])
+        word, *words = line
         word = word.lower()
         if word == ("joint" if joints else "root") or (word == "end" and joints):
-            name = "" if word == "end" else " ".join(rest)
-            if word != "end" and name in names:
-                raise line.error(f"joint '{name[:40]}' has no name or one that is taken")
-            names.add(name)
+            name = "" if word == "end" else " ".join(words)
+            if name and name in [joint.name for joint in joints]:
+                raise ValueError(f"joint '{name[:40]}' has a name that is taken")
             joints.append(Joint(name, open_joints[-1] if open_joints else -1, first=columns))
             open_joints.append(len(joints) - 1)
-            _next_line(lines, path, "{")
+            _expect(lines, "{")
         elif word == "offset" and open_joints:
-            joints[open_joints[-1]].offset = np.array(line.numbers(1, 3, last=True))
+            joints[open_joints[-1]].offset = np.array(finite_numbers(words, 3))
         elif word == "channels" and open_joints[-1:] == [len(joints) - 1] and not joints[-1].channels:
-            joints[-1].channels = tuple(CHANNELS.get(word.lower(), "") for word in rest[1:])
+            joints[-1].channels = tuple(CHANNELS.get(word.lower(), "") for word in words[1:])
             columns += len(joints[-1].channels)
             known = set(joints[-1].channels) - {""}
-            if not rest[:1] == [str(len(rest) - 1)] == [str(len(known))]:
-                raise line.error(
-                    f"'{' '.join(line.tokens)[:60]}' declares other channels than it names, or unknown ones"
-                )
+            if not words[:1] == [str(len(words) - 1)] == [str(len(known))]:
+                raise ValueError(f"'{' '.join(line)[:60]}' declares other channels than it names")
         elif word == "}" and open_joints:
             open_joints.pop()
         else:
-            raise line.error(f"'{' '.join(line.tokens)[:40]}' is not known in a hierarchy, or out of place")
+            raise ValueError(f"'{' '.join(line)[:40]}' is not known in a hierarchy, or out of place")
     return joints

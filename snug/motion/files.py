@@ -18,7 +18,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from fnmatch import fnmatch
 from pathlib import Path
 
@@ -30,7 +29,7 @@ from snug.file_options import MotionFileOptions
 from snug.motion.acclaim import read_asf_amc
 from snug.motion.bvh import read_bvh
 from snug.motion.motion import Motion, MotionError, clear_arms, place, resample
-from snug.motion.raw_motion import RawMotion, frame_rate, remove_recording_errors, turn_y_up
+from snug.motion.recording import check_recording, frame_rate, turn_y_up
 
 LAYOUTS = {22: "body", 24: "SMPL", 52: "SMPL+H", 55: "SMPL-X"}  # joints, the root among them
 # Of several names the first that a file has is read.
@@ -41,7 +40,7 @@ RATES = ("mocap_framerate", "mocap_frame_rate", "framerate", "frame_rate", "fps"
 ARRAY_NAMES = (*ROTATIONS, *ROOT_ROTATIONS, *PATHS, *RATES)
 
 
-def read_smpl_arrays(path: Path, options: MotionFileOptions) -> RawMotion:
+def read_smpl_arrays(path: Path, options: MotionFileOptions) -> Motion:
     """Read an .npz or a pickled dict with arrays of the table. Nothing in a pickle is executed.
 
     Raises:
@@ -54,60 +53,56 @@ def read_smpl_arrays(path: Path, options: MotionFileOptions) -> RawMotion:
         raise MotionError(f"{error}; give an .npz with 'poses', 'trans' and 'fps'") from None
     for name, array in arrays.items():
         if array.dtype.kind not in "iuf" or array.size == 0:
-            raise MotionError(
-                f"{path}: array '{name}' is empty or holds no numbers; give floating-point values"
-            )
+            raise MotionError(f"array '{name}' is empty or holds no numbers; give floating-point values")
     arrays = {name: array.astype(np.float64) for name, array in arrays.items()}
-    name = _first(path, arrays, ROTATIONS, "rotations (frames, 72) [rad]")
-    turns, frames = _triples(path, arrays, name), len(arrays[name])
+    name = _first(arrays, ROTATIONS, "rotations (frames, 72) [rad]")
+    turns, frames = _triples(arrays, name), len(arrays[name])
     if turns.shape[1] + 1 in LAYOUTS:
-        root = _first(path, arrays, ROOT_ROTATIONS, f"the root's rotation beside '{name}'")
-        turns = np.concatenate([_triples(path, arrays, root, frames)[:, :1], turns], axis=1)
+        root = _first(arrays, ROOT_ROTATIONS, f"the root's rotation beside '{name}'")
+        turns = np.concatenate([_triples(arrays, root, frames)[:, :1], turns], axis=1)
         name = f"{root} and {name}"
     if turns.shape[1] not in LAYOUTS:
         known = ", ".join(f"{3 * joints} ({layout})" for joints, layout in LAYOUTS.items())
         raise MotionError(
-            f"{path}: '{name}' has shape {arrays[name].shape}; give (frames, columns), columns one of {known}"
+            f"'{name}' has shape {arrays[name].shape}; give (frames, columns), columns one of {known}"
         )
     poses = np.zeros((frames, len(JOINT_NAMES), 3))
     kept = poses.shape[1] if turns.shape[1] == poses.shape[1] else BODY_JOINTS
     poses[:, :kept] = turns[:, :kept]
-    place = _first(path, arrays, PATHS, "the root's path (frames, 3) [m]; zeros where it stays")
-    translations = _triples(path, arrays, place, frames)[:, 0]
+    place = _first(arrays, PATHS, "the root's path (frames, 3) [m]; zeros where it stays")
+    translations = _triples(arrays, place, frames)[:, 0]
     stated = next((arrays[rate] for rate in RATES if rate in arrays), None)
     if stated is not None and stated.size != 1:
-        raise MotionError(f"{path}: the frames per second are {stated.size} numbers; give one")
-    fps = frame_rate(path, frames, None if stated is None else stated.item(), options)
+        raise MotionError(f"the frames per second are {stated.size} numbers; give one")
+    fps = frame_rate(frames, None if stated is None else stated.item(), options.fps)
     source = f"{path.name} ({name}, {LAYOUTS[turns.shape[1]]} layout)"
-    return RawMotion(path=path, poses=poses, translations=translations, fps=fps, source=source)
+    return Motion(path.stem, poses, translations, fps, "recorded", source)
 
 
-def _first(path: Path, arrays: Mapping[str, np.ndarray], names: tuple[str, ...], meaning: str) -> str:
+def _first(arrays: Mapping[str, np.ndarray], names: tuple[str, ...], meaning: str) -> str:
     """Return the first of `names` that the arrays have. Raises MotionError."""
     for name in names:
         if name in arrays:
             return name
     found = ", ".join(sorted(arrays)) or "none that is known"
-    raise MotionError(f"{path}: no array '{names[0]}' (found {found}); give {meaning}")
+    raise MotionError(f"no array '{names[0]}' (found {found}); give {meaning}")
 
 
-def _triples(path: Path, arrays: Mapping[str, np.ndarray], name: str, frames: int = 0) -> np.ndarray:
+def _triples(arrays: Mapping[str, np.ndarray], name: str, frames: int = 0) -> np.ndarray:
     """Return (T, N, 3) of an array (T, 3 N) or (T, N, 3). Raises MotionError.
 
     frames: T of an array that has one triple a frame; 0 for any T and N.
     """
     array, shape = arrays[name], arrays[name].shape
     if frames and shape not in ((frames, 3), (frames, 1, 3)):
-        raise MotionError(f"{path}: '{name}' has shape {shape}; give ({frames}, 3), a row for each pose")
+        raise MotionError(f"'{name}' has shape {shape}; give ({frames}, 3), a row for each pose")
     if not (shape[2:] == (3,) or (len(shape) == 2 and shape[1] % 3 == 0)):
-        raise MotionError(
-            f"{path}: '{name}' has shape {shape}; give (frames, 3 joints) or (frames, joints, 3) [rad]"
-        )
+        raise MotionError(f"'{name}' has shape {shape}; give (frames, 3 joints) or (frames, joints, 3) [rad]")
     return array.reshape(len(array), -1, 3)
 
 
 # Extension of a motion file: its reader. Each gives the clip as recorded, in the axes of the file.
-READERS: dict[str, Callable[[Path, MotionFileOptions], RawMotion]] = {
+READERS: dict[str, Callable[[Path, MotionFileOptions], Motion]] = {
     ".amc": read_asf_amc,
     ".bvh": read_bvh,
     ".npz": read_smpl_arrays,
@@ -168,13 +163,13 @@ def read_motion(file: Path, options: MotionFileOptions) -> Motion:
             f"{MAX_NAME_BYTES} bytes: letters, digits, single spaces"
         )
     reader = READERS.get(file.suffix.lower())
-    if reader is None:
-        raise MotionError(f"{file}: unknown kind of file; motions are read from {', '.join(READERS)}")
-    # Absurd numbers overflow here, and are refused by name where recording errors are looked for.
-    with np.errstate(all="ignore"):
-        raw = reader(file, options)
-        damped = raw.poses.copy()
-        damped[:, HANDS] *= HAND_DAMPING
-        raw = remove_recording_errors(replace(raw, poses=damped), repair=options.repair)
-    raw = turn_y_up(raw, options.up)
-    return Motion(name, raw.poses, raw.translations, raw.fps, "recorded", raw.source)
+    try:
+        if reader is None:
+            raise MotionError(f"unknown kind of file; motions are read from {', '.join(READERS)}")
+        with np.errstate(all="ignore"):  # absurd numbers overflow here, and are refused
+            motion = reader(file, options)
+            motion.poses[:, HANDS] *= HAND_DAMPING
+            check_recording(motion)
+        return turn_y_up(motion, options.up)
+    except MotionError as error:
+        raise MotionError(f"{file}: {error}") from None

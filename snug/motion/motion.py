@@ -38,7 +38,7 @@ class Motion:
         translations: (T, 3) [m] of the root.
         fps: frames per second [1/s].
         kind: groups motions of one sort ("walk", "jump").
-        source: where it came from, and every repair.
+        source: where it came from, and every change.
 
     Raises:
         MotionError: shapes disagree, a number is not finite, or there is no frame.
@@ -65,8 +65,10 @@ class Motion:
             raise MotionError(
                 f"motion {self.name}: translations have shape {translations.shape}; give ({len(poses)}, 3)"
             )
-        if not (np.isfinite(poses).all() and np.isfinite(translations).all()):
-            raise MotionError(f"motion {self.name}: not every number is finite; repair the file")
+        finite = np.isfinite(poses).all(axis=(1, 2)) & np.isfinite(translations).all(axis=1)
+        if not finite.all():
+            frames = f"{np.count_nonzero(~finite)} frames, from frame {finite.argmin()} on"
+            raise MotionError(f"motion {self.name}: numbers are not finite in {frames}; cut the clip there")
         if not (np.isfinite(self.fps) and self.fps > 0):
             raise MotionError(f"motion {self.name}: {self.fps} frames per second; give a positive rate")
         object.__setattr__(self, "poses", poses)

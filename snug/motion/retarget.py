@@ -14,7 +14,6 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from itertools import product
-from pathlib import Path
 
 import numpy as np
 
@@ -35,7 +34,6 @@ ASTRIDE, ARMS_DOWN = np.deg2rad(60.0), np.deg2rad(95.0)
 
 
 def retarget(
-    path: Path,
     turns: Mapping[str, np.ndarray],
     directions: Mapping[str, np.ndarray],
     hinges: Mapping[str, np.ndarray],
@@ -43,7 +41,6 @@ def retarget(
     """Return our poses (T, 24, 3) [rad] relative to the parents; a joint that they lack does not turn.
 
     Args:
-        path: of their skeleton, for messages.
         turns: (T, 3, 3) by our joint, its rotation in the world from their zero pose.
         directions: (3,) of LIMBS, and of FEET where there are any, in their zero pose, y up, facing +z.
         hinges: (3,) axes of HINGES in the same pose; empty for a skeleton without.
@@ -54,7 +51,7 @@ def retarget(
     rotations = np.empty((len(turns["pelvis"]), len(JOINT_NAMES), 3, 3))
     for joint, name in enumerate(JOINT_NAMES):
         if name in turns:
-            rotations[:, joint] = turns[name] @ _alignment(path, name, directions, hinges)
+            rotations[:, joint] = turns[name] @ _alignment(name, directions, hinges)
         else:
             rotations[:, joint] = rotations[:, PARENTS[joint]]
     relative = rotations.copy()
@@ -65,7 +62,7 @@ def retarget(
 
 
 def _alignment(
-    path: Path, name: str, directions: Mapping[str, np.ndarray], hinges: Mapping[str, np.ndarray]
+    name: str, directions: Mapping[str, np.ndarray], hinges: Mapping[str, np.ndarray]
 ) -> np.ndarray:
     """Return A (3, 3) of one joint.
 
@@ -74,7 +71,7 @@ def _alignment(
     """
     side, _, part = name.partition("_")
     if part in ("wrist", "hand"):
-        return _alignment(path, f"{side}_elbow", directions, hinges)
+        return _alignment(f"{side}_elbow", directions, hinges)
     if part in ("ankle", "foot") and f"{side}_ankle" in directions:
         theirs = directions[f"{side}_ankle"]
         ours = REST_JOINTS[JOINT[f"{side}_foot"]] - REST_JOINTS[JOINT[f"{side}_ankle"]]
@@ -92,12 +89,12 @@ def _alignment(
         angle = float(np.arctan2(sine, ours @ theirs))
         if angle > (ASTRIDE if hinge.endswith("knee") else ARMS_DOWN):
             raise MotionError(
-                f"{path}: its zero pose is no T or A pose: {name} is turned by {np.degrees(angle):.0f} "
+                f"its zero pose is no T or A pose: {name} is turned by {np.degrees(angle):.0f} "
                 "degrees; export it with a T pose at rest"
             )
         turn = rotation_matrices(axis * (angle / sine)) if sine > 0.0 else np.eye(3)
     if not np.isfinite(turn).all() or not theirs.any():
-        raise MotionError(f"{path}: {name} has no length, or lies along its own hinge; export it again")
+        raise MotionError(f"{name} has no length, or lies along its own hinge; export it again")
     return turn
 
 
@@ -129,11 +126,10 @@ SIDE_WORDS = {"l": "left", "left": "left", "r": "right", "right": "right"}
 _BREAKS = re.compile(r"[\s_.\-]+|(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 
 
-def match_joints(path: Path, names: Sequence[str], parents: Sequence[int]) -> dict[str, int]:
+def match_joints(names: Sequence[str], parents: Sequence[int]) -> dict[str, int]:
     """Return our joint names with the indices of their joints; optional ones that they lack are left out.
 
     Args:
-        path: of the motion, for messages.
         names: of their joints, empty for end sites.
         parents: indices, -1 for the root, parents first.
 
@@ -145,9 +141,9 @@ def match_joints(path: Path, names: Sequence[str], parents: Sequence[int]) -> di
         if ours not in matches:
             known = ", ".join(filter(None, names))
             raise MotionError(
-                f"{path}: no joint is known as '{ours}'; rename it in the file (there are {known[:300]})"
+                f"no joint is known as '{ours}'; rename it in the file (there are {known[:300]})"
             )
-    return _trunk(path, names, parents, matches) | matches
+    return _trunk(names, parents, matches) | matches
 
 
 def _limbs(names: Sequence[str]) -> dict[str, int]:
@@ -182,15 +178,13 @@ def _side(name: str) -> tuple[str, str]:
     return "", "".join(parts)
 
 
-def _trunk(
-    path: Path, names: Sequence[str], parents: Sequence[int], matches: Mapping[str, int]
-) -> dict[str, int]:
+def _trunk(names: Sequence[str], parents: Sequence[int], matches: Mapping[str, int]) -> dict[str, int]:
     """Match pelvis, spine, neck and head by their places; the spine may have one or any number of joints."""
     pelvis = _meet(parents, matches["left_hip"], matches["right_hip"])
     chest = _meet(parents, matches["left_shoulder"], matches["right_shoulder"])
     head = next((index for index, name in enumerate(names) if _side(name)[1].endswith("head")), None)
     if head is None:
-        raise MotionError(f"{path}: no joint is known as 'head'; rename it in the file")
+        raise MotionError("no joint is known as 'head'; rename it in the file")
     trunk = {"pelvis": pelvis, "head": head}
     spine = [joint for joint in reversed(way_up(parents, chest)) if pelvis in way_up(parents, joint)[1:]]
     if spine:

@@ -1,12 +1,17 @@
 """One motion in the forms that people keep motions in, written by code of its own; speeds of joints."""
 
 import pickle
+import re
 from pathlib import Path
 
 import numpy as np
+import pytest
 from scipy.spatial.transform import Rotation
 
 from snug.body.skeleton import JOINT_NAMES, PARENTS, REST_JOINTS, axis_angles, rotation_matrices
+from snug.file_options import MotionFileOptions
+from snug.motion.files import load_motions, read_motion
+from snug.motion.motion import MotionError
 
 Y_UP = np.eye(3)
 # From y up to z up: (x, y, z) becomes (x, -z, y).
@@ -18,6 +23,19 @@ MIXAMO = {
         ("hip", "UpLeg"), ("knee", "Leg"), ("ankle", "Foot"), ("foot", "ToeBase"), ("collar", "Shoulder"),
         ("shoulder", "Arm"), ("elbow", "ForeArm"), ("wrist", "Hand"), ("hand", "HandMiddle1"))},
 }  # fmt: skip
+
+
+def read(path, **options):
+    return read_motion(path, MotionFileOptions(**options))
+
+
+def refuse(path, words, named=None, **options):
+    """Reading ends in one line that has these words and names the file."""
+    with pytest.raises(MotionError) as caught:
+        load_motions(path, options=MotionFileOptions(**options))
+    message = str(caught.value)
+    assert re.search(words, message), message
+    assert (named or path).name in message and "\n" not in message and len(message) < 500
 
 
 def of_root(motion, turn):

@@ -1,22 +1,16 @@
 """BVH clips: names of joints, zero poses, orders of channels, and each broken file refused by name."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
 from snug.body.skeleton import JOINT, JOINT_NAMES, PARENTS, REST_JOINTS, joint_positions
-from snug.file_options import MotionFileOptions
 from snug.motion.bvh import read_clip, shift_of, turns_of
-from snug.motion.files import read_motion
 from snug.motion.library import make_motion
-from snug.motion.motion import MotionError
 from snug.motion.retarget import NEEDED, match_joints
-from tests.snug.motion.motion_forms import MIXAMO, bvh
+from tests.snug.motion.motion_forms import MIXAMO, bvh, read, refuse
 
 WALK = make_motion("walk").cut(20, 40)
-LEGS = ("left_hip", "left_knee", "right_hip", "right_knee")
 
 
 def written(path, text=None, **options):
@@ -78,7 +72,7 @@ MIXAMORIG = ", ".join(f"mixamorig:{MIXAMO[name]} {PARENTS[k]}" for k, name in en
 
 def known(skeleton):
     names, parents = zip(*(joint.strip().rsplit(" ", 1) for joint in skeleton.split(",")), strict=True)
-    indices = match_joints(Path("a.bvh"), names, [int(parent) for parent in parents])
+    indices = match_joints(names, [int(parent) for parent in parents])
     return {ours: names[index] for ours, index in indices.items()}
 
 
@@ -135,7 +129,7 @@ def test_limbs_of_another_skeleton_point_where_its_own_do(tmp_path):
     zero, world = np.zeros((2, 24, 3)), Rotation.from_euler("zx", [0, 90], degrees=True)
     heading = Rotation.from_euler("z", 60, degrees=True) * world
     text = bvh(zero, np.zeros((2, 3)), 60.0, rest=heading.apply(rest))
-    motion = read_motion(written(tmp_path / "a.bvh", text), MotionFileOptions())
+    motion = read(written(tmp_path / "a.bvh", text))
     back = Rotation.from_matrix(np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])) * heading
     limbs = ("left_shoulder left_elbow", "right_elbow right_wrist", "left_hip left_knee")
     for near, far in map(str.split, limbs):
@@ -149,45 +143,39 @@ def test_limbs_of_another_skeleton_point_where_its_own_do(tmp_path):
 
 def test_the_path_is_scaled_by_the_length_of_the_legs(tmp_path):
     lengths = written(tmp_path / "a.bvh", bvh(WALK.poses, 2 * WALK.translations, 30.0, rest=2 * REST_JOINTS))
-    large = read_motion(lengths, MotionFileOptions())
+    large = read(lengths)
     travelled = large.translations - large.translations[0]
     np.testing.assert_allclose(travelled, WALK.translations - WALK.translations[0], atol=1e-6)
 
 
 @pytest.mark.parametrize(
-    ("change", "message"),
+    ("change", "words"),
     [
-        (lambda text: "", "ends before it is whole"),
         (lambda text: "solid\n" + text, "line 1: 'solid' where 'HIERARCHY' should be"),
-        (lambda text: text.replace("MOTION", "MOVE"), "where 'MOTION' should be"),
+        (lambda text: text.partition("MOTION")[0], "'' where 'MOTION' should be"),
         (lambda text: text.replace("Frames: 20", "Frames: 21"), "declares 21 frames and holds 20"),
-        (lambda text: text.replace("Frames: 20", "Frames: 0"), "declares 0 frames"),
         (lambda text: text.replace("Frame Time: 0.0333333", "Frame Time: 0"), "no frame rate"),
         (lambda text: text.replace("CHANNELS 3", "CHANNELS 4", 1), "declares other channels"),
-        (lambda text: text.replace("Zrotation", "Wrotation", 1), "unknown ones"),
-        (lambda text: text.replace("JOINT left_knee", "JOINT left_hip"), "'left_hip' has no name or"),
+        (lambda text: text.replace("Zrotation", "Wrotation", 1), "declares other channels"),
+        (lambda text: text.replace("JOINT left_knee", "JOINT left_hip"), "'left_hip' has a name that is"),
         (lambda text: text.replace("left_knee", "left_thing"), "no joint is known as 'left_knee'"),
         (lambda text: text.replace("head", "hat"), "no joint is known as 'head'"),
         (lambda text: text.replace("OFFSET", "OFFSETS", 1), "not known in a hierarchy"),
-        (lambda text: text.rsplit(" ", 1)[0] + " nan\n", "75 finite numbers"),
+        (lambda text: text.rsplit(" ", 1)[0] + " nan\n", "should be 75 finite numbers"),
         (lambda text: text.replace("left", "?").replace("right", "left").replace("?", "right"), "backwards"),
     ],
 )
-def test_a_broken_file_is_refused_by_name(tmp_path, change, message):
+def test_a_broken_file_is_refused(tmp_path, change, words):
     path = written(tmp_path / "clip.bvh")
     path.write_text(change(path.read_text()))
-    with pytest.raises(MotionError, match=message) as caught:
-        read_motion(path, MotionFileOptions())
-    assert "clip.bvh" in str(caught.value) and "\n" not in str(caught.value)
+    refuse(path, words)
 
 
 def test_a_zero_pose_that_does_not_stand_is_refused(tmp_path):
     arms_up = REST_JOINTS.copy()
+    shoulder = REST_JOINTS[JOINT["left_shoulder"]]
     for name in ("left_elbow", "left_wrist", "left_hand"):
-        arms_up[JOINT[name]] = REST_JOINTS[JOINT["left_shoulder"]] - [
-            REST_JOINTS[JOINT[name], 0] - REST_JOINTS[JOINT["left_shoulder"], 0], 0, 0]  # fmt: skip
-    with pytest.raises(MotionError, match=r"no T or A pose: left_shoulder is turned by 180 degrees"):
-        read_motion(written(tmp_path / "a.bvh", rest=arms_up), MotionFileOptions())
-    flat = np.zeros((24, 3))
-    with pytest.raises(MotionError, match="legs or hips of its zero pose have no length"):
-        read_motion(written(tmp_path / "a.bvh", rest=flat), MotionFileOptions())
+        arms_up[JOINT[name]] = shoulder - (REST_JOINTS[JOINT[name]] - shoulder) * [1.0, 0.0, 0.0]
+    turned = "no T or A pose: left_shoulder is turned by 180 degrees"
+    refuse(written(tmp_path / "a.bvh", rest=arms_up), turned)
+    refuse(written(tmp_path / "a.bvh", rest=np.zeros((24, 3))), "legs or hips of its zero pose")

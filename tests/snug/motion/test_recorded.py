@@ -23,7 +23,7 @@ from snug.motion.library import (
     make_motion,
 )
 from snug.motion.motion import arm_clearance
-from snug.motion.raw_motion import MAX_TURN_SPEED, RawMotion, remove_recording_errors
+from snug.motion.recording import MAX_TURN_SPEED, check_recording
 from tests.snug.motion.motion_forms import joint_speeds
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -79,10 +79,7 @@ def test_a_clip_is_a_person_on_the_floor_without_recording_errors(name, clips):
     motion = clips[name]
     assert motion.name == name and motion.fps == 30.0 and motion.kind == CLIPS[name].content
     assert joint_speeds(motion).max() < TURN_LIMIT < MAX_TURN_SPEED
-    raw = RawMotion(
-        path=CLIPS_FILE, poses=motion.poses, translations=motion.translations, fps=30.0, source=""
-    )
-    assert remove_recording_errors(raw, repair=False) is raw
+    check_recording(motion)
     lowest = sole_points(motion.poses, motion.translations)[..., 1].min(axis=1)
     assert abs(np.percentile(lowest, 2.0)) < 1e-6
     assert (arm_clearance(motion).min(axis=1) > np.radians(25.0)).mean() >= 0.95

@@ -1,0 +1,161 @@
+"""Steps that the readers of motion files share: lines of text, frame rate, recording errors, vertical axis.
+
+Their errors name no file; `snug.motion.files.read_motion` puts it in front.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TypeVar
+
+import numpy as np
+
+from snug.body.skeleton import JOINT, JOINT_NAMES, axis_angles, joint_positions, rotation_matrices
+from snug.motion.motion import Motion, MotionError
+
+Content = TypeVar("Content")
+
+MAX_TEXT_BYTES = 64 << 20  # [bytes] of a file of text
+MAX_FRAMES = 100_000  # 14 minutes at 120 frames per second
+MAX_SECONDS = 1800.0  # [s] a clip of few frames per second becomes many at 30
+LOWEST_RATE, HIGHEST_RATE = 5.0, 1000.0  # [1/s] rates of frames that a recording may have
+
+
+def parse_lines(path: Path, parse: Callable[[Iterator[list[str]]], Content], comment: str = "\0") -> Content:
+    """Return what `parse` makes of the lines of a text file, each a list of words.
+
+    Lines without a word are left out, and what follows the letter `comment`.
+
+    Raises:
+        MotionError: the file cannot be read or is too large, or names the line at which `parse` raised
+            ValueError.
+    """
+    try:
+        if path.stat().st_size > MAX_TEXT_BYTES:
+            raise MotionError(f"larger than {MAX_TEXT_BYTES >> 20} MB; cut the clip")
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError as problem:
+        raise MotionError(f"cannot be read ({problem.strerror}); check the path") from None
+    unread = iter(lines)
+    words = (line.partition(comment)[0].split() for line in unread)
+    try:
+        return parse(filter(None, words))
+    except ValueError as problem:
+        number = len(lines) - len(list(unread))
+        raise MotionError(f"line {number}: {str(problem)[:300]}; export the file again") from None
+
+
+def finite_numbers(words: Sequence[str], count: int) -> list[float]:
+    """Return words as `count` finite numbers. Raises ValueError."""
+    values = [float(word) for word in words]
+    if len(values) != count or not all(map(math.isfinite, values)):
+        raise ValueError(f"'{' '.join(words)[:60]}' should be {count} finite numbers")
+    return values
+
+
+def frame_rate(frames: int, stated: float | None, given: float | None, usual: float | None = None) -> float:
+    """Return the frames per second [1/s]: of the file, else of the options, else `usual` for such files.
+
+    Raises:
+        MotionError: there is none of them, file and options disagree, no recording has that rate, or the
+            clip has no frame, more than MAX_FRAMES, or more than MAX_SECONDS.
+    """
+    if stated is not None and given is not None and abs(stated - given) > 0.01 * stated:
+        raise MotionError(f"states {stated:g} frames per second, fps={given:g} is given; leave it out")
+    fps = next((value for value in (stated, given, usual) if value is not None), None)
+    if fps is None:
+        raise MotionError("states no frame rate; add ,fps=N behind the path")
+    if not LOWEST_RATE <= fps <= HIGHEST_RATE:
+        raise MotionError(f"{fps:g} frames per second; rates are {LOWEST_RATE:g} to {HIGHEST_RATE:g}")
+    if not 0 < frames <= min(MAX_FRAMES, MAX_SECONDS * fps):
+        limits = f"1 to {MAX_FRAMES} frames and at most {MAX_SECONDS:.0f} s are read"
+        raise MotionError(f"{frames} frames, which last {frames / fps:.0f} s; {limits}: cut the clip")
+    return fps
+
+
+# 30 degrees in 1/120 s: twice the fastest joint of a kick or a sprint. A swapped or lost marker does it.
+MAX_TURN_SPEED = np.deg2rad(30.0) * 120.0  # [rad/s]
+MAX_ROOT_SPEED = 10.0  # [m/s] of the root: a sprinter's speed
+# A joint that turns further, or a root that is further away, was not written in radians or metres.
+MAX_ANGLE = 4.0 * np.pi  # [rad] of all joints but the root, whose turns may have been added up
+MAX_ROOT_ANGLE = 1e3  # [rad] of the root
+MAX_DISTANCE = 1e4  # [m]
+MAX_NAMED = 4  # joints, and frames of each, in a message
+
+
+def check_recording(motion: Motion) -> None:
+    """Raise MotionError for other units and for jumps; the message names joints and frames."""
+    angles = np.linalg.norm(motion.poses, axis=2)
+    if (angles[:, 1:] > MAX_ANGLE).any() or (angles[:, 0] > MAX_ROOT_ANGLE).any():
+        raise MotionError("a joint turns by more than a person's; write radians, not degrees")
+    if (np.abs(motion.translations) > MAX_DISTANCE).any():
+        raise MotionError(f"the root is more than {MAX_DISTANCE:g} m away; write metres")
+    rotations = rotation_matrices(motion.poses)
+    turns = axis_angles(np.swapaxes(rotations[:-1], -1, -2) @ rotations[1:]) / MAX_TURN_SPEED
+    shifts = np.diff(motion.translations, axis=0)[:, None] / MAX_ROOT_SPEED
+    speeds = np.linalg.norm(np.concatenate([turns, shifts], axis=1), axis=2) * motion.fps
+    errors = []
+    for name, speed in zip((*JOINT_NAMES, "the root"), speeds.T, strict=True):
+        if len(frames := np.flatnonzero(speed > 1.0) + 1):
+            errors.append(f"{name} before frame {_first_of(list(map(str, frames)))}")
+    if errors:
+        raise MotionError(f"{_first_of(errors)}: a jump; cut the clip there, or check frame rate and units")
+
+
+def _first_of(names: Sequence[str]) -> str:
+    return ", ".join(names[:MAX_NAMED]) + f" and {len(names) - MAX_NAMED} more" * (len(names) > MAX_NAMED)
+
+
+# From the axes of a file, by the one that is vertical, to ours: with z up (x, y, z) becomes (x, z, -y).
+TO_Y_UP = {
+    "y": np.eye(3),
+    "z": np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]]),
+}
+MAX_LYING_COSINE = 0.3  # between the vertical and the way from ankles to head: below it a body lies or crawls
+MAX_RISE = 1.0  # [m] the lowest joint may rise and fall where no axis is given: more than a jump
+
+
+def turn_y_up(motion: Motion, up: str) -> Motion:
+    """Turn a motion in the axes of its file so that y is up.
+
+    In a frame the body stands along the axis that is nearest to the direction from its ankles to its head.
+    The axis of more than half of the frames is taken; a body that lies in the others, as after a fall, is
+    fine.
+
+    Args:
+        motion: in the axes of its file.
+        up: its vertical axis, "y" or "z"; empty: the one along which the body stands.
+
+    Raises:
+        MotionError: no axis is that, the given one is not, or a body that should stand along the axis found
+            travels along it: it may be crawling.
+    """
+    joints = joint_positions(motion.poses, motion.translations)
+    ankles = joints[:, [JOINT["left_ankle"], JOINT["right_ankle"]]].mean(axis=1)
+    directions = joints[:, JOINT["head"]] - ankles
+    directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-9)
+    nearest = np.concatenate([directions, -directions], axis=1).argmax(axis=1)
+    shares = {axis: np.mean(nearest == "xyz".index(axis)) for axis in TO_Y_UP}
+    axis = up or max(shares, key=lambda axis: shares[axis])
+    share = f"{100 * shares[axis]:.0f} % of the frames"
+    along = "xyz".index(axis)
+    stands = (directions[:, along] > MAX_LYING_COSINE).mean() if up else shares[axis]
+    if stands <= 0.5:
+        raise MotionError(
+            f"the body stands along {axis} in {share} only; add ,up=y or ,up=z behind the path, "
+            "turn the root's rotation and path, or give a clip that stands"
+        )
+    rise = float(np.ptp(joints[..., along].min(axis=1)))
+    if not up and rise > MAX_RISE:
+        raise MotionError(
+            f"the body points along {axis} in {share}, and its lowest joint moves by {rise:.3g} m along it; "
+            f"if {axis} is up and the path in metres add ,up={axis}"
+        )
+    note = f"{up} up as given" if up else f"{axis} up, as the body stands in {share}"
+    poses, turn = motion.poses.copy(), TO_Y_UP[axis]
+    poses[:, 0] = axis_angles(turn @ rotation_matrices(poses[:, 0]))
+    translations = motion.translations @ turn.T
+    return replace(motion, poses=poses, translations=translations, source=f"{motion.source}; {note}")
