@@ -12,7 +12,6 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import numpy as np
 import pytest
 import torch
 
@@ -20,15 +19,13 @@ from benchmarks import run
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution
 from benchmarks.runner.isolated_process import start_loading
-from reference_sim.files.atomic_files import disk_full, new_folder, replacing
+from reference_sim.files.atomic_files import disk_full, replacing
 from snug.networks.tensor_file import read_tensors, write_tensors
 from snug.training import checkpoint as checkpoints
 from snug.training.checkpoint import Checkpoint
 from tests.benchmarks.runner.tasks_by_hand import InProcess
 from tests.reference_sim.test_trajectory import wave
 from tests.snug.training.test_checkpoint import same_model, short
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 @contextmanager
@@ -51,16 +48,10 @@ def save_bytes(path: Path) -> None:
         temporary.write_bytes(bytes(8000))
 
 
-def save_arrays(path: Path) -> None:
-    with replacing(path) as temporary:
-        np.savez(temporary, a=np.zeros(1000))
-
-
 @pytest.mark.parametrize(
     "write",
     [
         save_bytes,
-        save_arrays,
         lambda path: write_tensors(path, {"a": torch.ones(10_000)}, {"format": "x"}),
         lambda path: wave(400).save(path),
     ],
@@ -115,14 +106,3 @@ def test_a_run_stops_in_one_line_and_goes_on(tmp_path, monkeypatch, capsys):
         for made in (folder, other)
     )
     assert rows == others
-
-
-def test_two_processes_that_fill_a_folder_of_one_name_do_not_share_it(tmp_path, monkeypatch):
-    first, second = new_folder(tmp_path / "out"), new_folder(tmp_path / "out")
-    (first.__enter__() / "first").touch()
-    monkeypatch.setattr(os, "getpid", lambda: 7)
-    (second.__enter__() / "second").touch()
-    first.__exit__(None, None, None)
-    with pytest.raises(OSError, match="not empty"):
-        second.__exit__(None, None, None)
-    assert [p.name for p in tmp_path.rglob("*")] == ["out", "first"]

@@ -18,34 +18,24 @@ SMALL = {
 CELLS = json.loads(NOTEBOOK.read_text(encoding="utf-8"))["cells"]
 
 
-@pytest.fixture
-def run(monkeypatch, tmp_path):
-    """A function that runs the cells in one namespace, as Jupyter does, and returns it.
-
-    slow: with the cells that are marked so.
-    """
-    monkeypatch.chdir(tmp_path)
-    before = matplotlib.get_backend()
+def run(folder: Path, monkeypatch, *, slow: bool) -> dict:
+    """Run the cells in one namespace, as Jupyter does, and return it; `slow` ones too."""
+    monkeypatch.chdir(folder)
     matplotlib.use("Agg")
-
-    def run_cells(*, slow: bool) -> dict:
-        cells = [cell for cell in CELLS if cell["cell_type"] == "code"]
-        wanted = [cell for cell in cells if slow or "slow" not in cell["metadata"].get("tags", ())]
-        code = "\n".join("".join(cell["source"]) for cell in wanted)
-        for whole, part in SMALL.items():
-            assert whole in code
-            code = code.replace(whole, part)
-        names: dict = {"__name__": "notebook"}
-        exec(compile(code, str(NOTEBOOK), "exec"), names)
-        return names
-
-    yield run_cells
+    cells = [cell for cell in CELLS if cell["cell_type"] == "code"]
+    wanted = [cell for cell in cells if slow or "slow" not in cell["metadata"].get("tags", ())]
+    code = "\n".join("".join(cell["source"]) for cell in wanted)
+    for whole, part in SMALL.items():
+        assert whole in code
+        code = code.replace(whole, part)
+    names: dict = {"__name__": "notebook"}
+    exec(compile(code, str(NOTEBOOK), "exec"), names)
     matplotlib.pyplot.close("all")
-    matplotlib.use(before)
+    return names
 
 
-def test_the_cells_run_and_the_trained_network_is_nearer_the_simulation_than_a_brief_training(run, capsys):
-    names = run(slow=False)
+def test_the_cells_run_and_snug_is_nearer_the_simulation_than_after_a_minute(tmp_path, monkeypatch, capsys):
+    names = run(tmp_path, monkeypatch, slow=False)
     energies = {name: values.mean() for name, values in names["energies"].items()}
     assert list(energies) == ["SNUG", "SNUG, a minute", "Simulation"]
     assert energies["Simulation"] < energies["SNUG"] < energies["SNUG, a minute"]
@@ -54,8 +44,8 @@ def test_the_cells_run_and_the_trained_network_is_nearer_the_simulation_than_a_b
 
 
 @pytest.mark.slow
-def test_the_scenes_own_score_runs_too(run):
-    scored = run(slow=True)["scored"]
+def test_the_scenes_own_score_runs_too(tmp_path, monkeypatch):
+    scored = run(tmp_path, monkeypatch, slow=True)["scored"]
     assert scored["status"] == "ok" and scored["metrics"]["energy/total"]["unit"] == "J"
 
 

@@ -16,9 +16,11 @@ from tests.benchmarks.runner.tasks_by_hand import assets_of, context, training
 from tests.snug.training.dressing import swaying, tube_dress
 
 
-def test_every_trained_method_has_a_training_and_steps_in_each_preset():
-    for entry in (entry for entry in METHODS if entry.trained not in (None, "untrained")):
-        kind = (entry.training or TRAININGS[entry.trained]).kind
+def test_every_kind_is_a_method_and_every_trained_method_has_steps_in_each_preset():
+    trained = [entry for entry in METHODS if entry.trained not in (None, "untrained")]
+    kinds = [(entry.training or TRAININGS[entry.trained]).kind for entry in trained]
+    assert set(kinds) == set(KINDS)
+    for entry, kind in zip(trained, kinds):
         assert entry.seeded != KINDS[kind].fitted and entry.reporting.pairing_group
         assert all(preset.steps_of(entry.trained, kind) > 0 for preset in PRESETS)
 
