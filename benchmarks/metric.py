@@ -141,7 +141,7 @@ def measurements_in(home: str) -> Measurements:
 
 @dataclass(eq=False)
 class Kept:
-    """Memory of what metric modules computed of an object: kept(make) is make(object), computed once."""
+    """Memory of what metric modules computed of an object."""
 
     _made: dict[Callable[..., Any], Any] = field(default_factory=dict, init=False, repr=False)
 
@@ -199,11 +199,6 @@ class RollOut(Kept):
         """Return the frames after the warm-up that positions (T',V,3) [m] of another roll-out have too."""
         return slice(self.scene.warm_up, min(len(self.positions), len(other)))
 
-    @property
-    def place(self) -> int:
-        """Index among the roll-outs of the group."""
-        return self.group.roll_outs.index(self)
-
 
 @dataclass(eq=False)
 class SceneRollOuts(Kept):
@@ -236,8 +231,3 @@ class SceneRollOuts(Kept):
             if is_member(roll_out.entry.reporting.family, roll_out.entry.reporting.level)
             and roll_out.status == "ok"
         ]
-
-    @property
-    def positions(self) -> list[np.ndarray]:
-        """Positions (T,V,3) [m] of each roll-out."""
-        return [roll_out.positions for roll_out in self.roll_outs]

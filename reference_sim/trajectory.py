@@ -227,12 +227,20 @@ def write_point_cache(path: str | Path, trajectory: Trajectory) -> tuple[Path, P
     return path, mesh
 
 
-def write_obj(path: Path, positions: np.ndarray, faces: np.ndarray) -> None:
-    """Write vertices (V,3) [m, y up] with the digits of float32 and faces (F,3), whole or not at all."""
-    lines = [f"v {x:.9g} {y:.9g} {z:.9g}\n" for x, y, z in positions.tolist()]
-    lines += [f"f {a} {b} {c}\n" for a, b, c in (faces + 1).tolist()]
+def write_obj(path: Path, positions: np.ndarray, faces: np.ndarray, uv: np.ndarray | None = None) -> None:
+    """Write vertices (V,3) [m, y up] with all digits and faces (F,3), whole or not at all.
+
+    uv: (V,2) of the vertices, or (F,3,2) of the corners.
+    """
+    lines = ["# metres, y up", *(f"v {x!r} {y!r} {z!r}" for x, y, z in positions.tolist())]
+    words = [[f"{vertex}" for vertex in face] for face in (faces + 1).tolist()]
+    if uv is not None:
+        lines += [f"vt {u!r} {v!r}" for u, v in uv.reshape(-1, 2).tolist()]
+        chart = faces if uv.ndim == 2 else np.arange(faces.size).reshape(-1, 3)
+        words = [[f"{v}/{t}" for v, t in zip(*pair)] for pair in zip(words, (chart + 1).tolist())]
+    lines += [" ".join(["f", *face]) for face in words]
     with replacing(path) as temporary:
-        temporary.write_text("".join(["# metres, y up\n", *lines]), encoding="utf-8")
+        temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def read_point_cache(path: str | Path) -> np.ndarray:

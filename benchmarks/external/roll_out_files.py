@@ -20,12 +20,12 @@ import re
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from reference_sim.files.array_file import read_arrays, read_pickled_arrays
-from reference_sim.files.mesh_files import MESH_SUFFIXES, METRES, UP_AXES, read_mesh, read_sequence
+from reference_sim.files.mesh_files import MESH_SUFFIXES, read_mesh, read_sequence
 from snug.file_options import split_words
 
 CHARACTERS = r"\w+.-"  # of a name, as a class of a regular expression
@@ -44,7 +44,7 @@ class RollOutOption:
     Attributes:
         name: of the method.
         path: file, folder or pattern; {scene} stands for the scene's name, its slashes as hyphens.
-        units: of the file, "m", "cm", "mm" or "in".
+        units: of the file.
         up: vertical axis of the file.
         fps: frames per second; they have to be the scene's.
         other_mesh: whether its vertices are those of another mesh of the same garment.
@@ -54,17 +54,14 @@ class RollOutOption:
 
     name: str
     path: str
-    units: str = "m"
-    up: str = "y"
+    units: Literal["m", "cm", "mm", "in"] = "m"
+    up: Literal["y", "z"] = "y"
     fps: float | None = None
     other_mesh: bool = False
     ms: float | None = None
     role: str = "external"
 
     def __post_init__(self) -> None:
-        for what, value, known in (("units", self.units, tuple(METRES)), ("up", self.up, UP_AXES)):
-            if value not in known:
-                raise RollOutFileError(f"{what}={value}: choose from {', '.join(known)}")
         for what, number in (("fps", self.fps), ("ms", self.ms)):
             if number is not None and not 0.0 < number < 1e9:
                 raise RollOutFileError(f"{what}={number}: give a positive number")
@@ -98,8 +95,10 @@ def parse_roll_out(text: str, *, named: bool = True) -> tuple[str, dict[str, Any
     return name, {"path": path, **words}
 
 
-ALIKE = ("positions", "faces", "fps", "obstacle", "obstacle_faces", "quasi_static")
-KEYS = {"pred": "positions", "cloth_faces": "faces", **dict(zip(ALIKE, ALIKE))}  # of an npz, and of a pickle
+OVER_TIME = ("positions", "obstacle", "quasi_static")
+FACES = {"faces": "positions", "obstacle_faces": "obstacle"}  # of which vertices
+KEYS = {name: name for name in (*OVER_TIME, *FACES, "fps")}  # of an npz, and of a pickle
+KEYS |= {"pred": "positions", "cloth_faces": "faces"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,32 +149,22 @@ def read_roll_out(path: str | Path) -> StoredRollOut:
 
 def _checked(arrays: Mapping[str, Any]) -> StoredRollOut:
     """Return the arrays, their shapes compared. Raises ValueError, without the file's name."""
-    positions = arrays.get("positions")
-    if positions is None:
+    given = {name: np.asarray(array) for name, array in arrays.items() if array is not None}
+    if "positions" not in given:
         raise ValueError("holds no positions (T,V,3): name them 'positions' in an npz, 'pred' in a pickle")
-    positions = np.asarray(positions)
-    dtype = str(positions.dtype.newbyteorder("="))
-    known = {"positions": _floats("positions", positions)}
-    frames, vertices = known["positions"].shape[:2]
-    for name, count in (("faces", vertices), ("obstacle_faces", None)):
-        if arrays.get(name) is not None:
-            known[name] = _triangles(name, np.asarray(arrays[name]), count)
-    for name in ("obstacle", "quasi_static"):
-        if arrays.get(name) is not None:
-            known[name] = _floats(name, np.asarray(arrays[name]))
-            if len(known[name]) != frames:
-                raise ValueError(f"{name} has {len(known[name])} frames, positions {frames}")
-    shape = known.get("quasi_static", known["positions"]).shape
-    if shape != (frames, vertices, 3):
-        raise ValueError(f"quasi_static is {shape}, positions {(frames, vertices, 3)}")
-    if "obstacle" in known and "obstacle_faces" in known:
-        _triangles("obstacle_faces", known["obstacle_faces"], known["obstacle"].shape[1])
-    fps = arrays.get("fps")
-    if fps is not None:
-        fps = float(np.asarray(fps, dtype=np.float64).item())
-        if not (np.isfinite(fps) and 0.0 < fps < 1e6):
-            raise ValueError(f"states {fps} frames per second")
-    return StoredRollOut(dtype=dtype, fps=fps, converged=arrays.get("converged"), **known)
+    known = {name: _floats(name, given[name]) for name in OVER_TIME if name in given}
+    shape = known["positions"].shape
+    for name, array in known.items():
+        if len(array) != len(known["positions"]) or (name == "quasi_static" and array.shape != shape):
+            raise ValueError(f"{name} is {array.shape}, positions {shape}")
+    for name, of in FACES.items():
+        if name in given:
+            known[name] = _triangles(name, given[name], known[of].shape[1] if of in known else np.inf)
+    fps = float(given["fps"].item()) if "fps" in given else None
+    if fps is not None and not 0.0 < fps < 1e6:
+        raise ValueError(f"states {fps} frames per second")
+    dtype = str(given["positions"].dtype.newbyteorder("="))
+    return StoredRollOut(dtype=dtype, fps=fps, converged=given.get("converged"), **known)
 
 
 def _floats(name: str, array: np.ndarray) -> np.ndarray:
@@ -184,12 +173,12 @@ def _floats(name: str, array: np.ndarray) -> np.ndarray:
     return np.ascontiguousarray(array, dtype=np.float64)
 
 
-def _triangles(name: str, array: np.ndarray, vertices: int | None) -> np.ndarray:
+def _triangles(name: str, array: np.ndarray, vertices: float) -> np.ndarray:
     if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "iu" or not len(array):
         raise ValueError(f"{name} is {array.dtype} {array.shape}: whole numbers of shape (triangles, 3)")
-    wrong = array[(array < 0) | (array >= (np.inf if vertices is None else vertices))]
+    wrong = array[(array < 0) | (array >= vertices)]
     if len(wrong):
-        raise ValueError(f"{name} names vertex {wrong[0]}" + (f" of {vertices}" if vertices else ""))
+        raise ValueError(f"{name} names vertex {wrong[0]} of {vertices}")
     return array.astype(np.int64)
 
 

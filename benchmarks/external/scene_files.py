@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,12 +12,11 @@ import numpy as np
 from reference_sim import Trajectory
 from reference_sim.files.atomic_files import new_folder
 from reference_sim.material import GRAVITY
-from reference_sim.trajectory import write_point_cache
+from reference_sim.trajectory import write_obj, write_point_cache
 
 if TYPE_CHECKING:
     from benchmarks.method import Method
     from benchmarks.scene import BuiltScene, Dressed, Scene
-    from reference_sim.obstacle import Obstacle
 
 FINGERS = 30  # joints of SMPL-H's hands, which a garment never meets
 # (x, y, z) with y up -> (x, -z, y) with z up.
@@ -29,7 +29,7 @@ faces +z in its rest pose. motion_amass.npz alone has z up. Gravity is 9.81 m/s^
 Order of vertices: that of rest.obj, the same in every file. Triangles wind outwards.
 Time: {frames} frames at {rate} a second (dt {dt:.6g} s); frame 0 is the start:
 start_positions and start_velocities. The first {warm_up_frames} frames are simulated and not judged.
-npz files hold float64, and pc2 and obj beside it float32; rest.obj has all digits.
+pc2 files hold float32, all others float64 with all digits.
 
 Files, as far as the scene has what they hold:
   scene.json         step, material, terms of the energy with their constants
@@ -41,7 +41,7 @@ Files, as far as the scene has what they hold:
                      docs/scene-files.md
   obstacle.npz       positions (T,B,3) of what the cloth touches, one frame where it stands still, faces;
                      rest_positions (B,3), the body unposed
-  obstacle.pc2, .obj the same in float32
+  obstacle.pc2, .obj the same, and its first frame
   motion_smpl.npz    poses (T,72) [rad], trans (T,3), betas, fps: SMPL's 24 joints, y up. Of a part of a
                      motion poses_before, trans_before, the frames until then: the start has the
                      velocities with which a simulation of them ends
@@ -71,97 +71,65 @@ NOT_SCORED = "The scene is for networks of benchmarks.run alone: no roll-out of 
 
 def write_scene_files(part: Path, scene: BuiltScene, facts: dict[str, Any]) -> None:
     """Write arrays, meshes and the facts, as scene.json, into a folder; README names each file's content."""
-    write_cloth(part, scene)
+    cloth, obstacle, worn = scene.cloth, scene.obstacle, scene.dressed
+    write_obj(part / "rest.obj", cloth.rest_positions, cloth.faces, cloth.rest_uv)
+    pinned = scene.pin_positions
+    _write_arrays(
+        part / "cloth.npz", rest_positions=cloth.rest_positions, faces=cloth.faces, masses=cloth.masses,
+        start_positions=scene.start, start_velocities=scene.start_velocity, rest_uv=cloth.rest_uv,
+        pins=np.asarray(cloth.pins, dtype=np.int64), kept=scene.kept,
+        pin_positions=None if pinned is None else np.stack([pinned(frame) for frame in range(scene.frames)]),
+    )  # fmt: skip
     arrays: dict[str, Any] = {
         f"{term.name}_{name}": value for term in scene.energies for name, value in term.arrays().items()
     }
-    np.savez(part / "energies.npz", **arrays)
-    if scene.obstacle is not None:
-        write_obstacle(part, scene, scene.obstacle)
-    if scene.dressed is not None:
-        write_motion(part, scene.dressed)
+    _write_arrays(part / "energies.npz", **arrays)
+    if obstacle is not None:
+        times = np.arange(len(obstacle.positions)) * scene.dt
+        write_point_cache(part / "obstacle.pc2", Trajectory(obstacle.positions, obstacle.faces, times))
+        _write_arrays(
+            part / "obstacle.npz", positions=obstacle.positions, faces=obstacle.faces, fps=1.0 / scene.dt,
+            rest_positions=None if worn is None else worn.body.shaped(worn.betas),
+        )  # fmt: skip
+    if worn is not None:
+        write_motion(part, worn)
     (part / "scene.json").write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
 
 
-def write_cloth(part: Path, scene: BuiltScene) -> None:
-    """Write the rest mesh and all arrays of the cloth."""
-    cloth = scene.cloth
-    write_obj(part / "rest.obj", cloth.rest_positions, cloth.faces, cloth.rest_uv)
-    arrays: dict[str, Any] = {
-        "rest_positions": cloth.rest_positions, "faces": cloth.faces, "masses": cloth.masses,
-        "start_positions": scene.start, "start_velocities": scene.start_velocity,
-        "pins": np.asarray(cloth.pins, dtype=np.int64),
-    }  # fmt: skip
-    if cloth.rest_uv is not None:
-        arrays["rest_uv"] = cloth.rest_uv
-    if scene.pin_positions is not None:
-        arrays["pin_positions"] = np.stack([scene.pin_positions(frame) for frame in range(scene.frames)])
-    if scene.kept is not None:
-        arrays["kept"] = scene.kept
-    np.savez(part / "cloth.npz", **arrays)
-
-
-def write_obj(path: Path, positions: np.ndarray, faces: np.ndarray, uv: np.ndarray | None) -> None:
-    """Write a mesh with all digits, so that reading gives the same numbers; UV of vertices or of corners."""
-    lines = ["# metres, y up", *(f"v {x!r} {y!r} {z!r}" for x, y, z in positions.tolist())]
-    places = faces + 1
-    if uv is None:
-        lines += [f"f {a} {b} {c}" for a, b, c in places.tolist()]
-    else:
-        texture = places if uv.ndim == 2 else np.arange(1, faces.size + 1).reshape(-1, 3)
-        lines += [f"vt {u!r} {v!r}" for u, v in uv.reshape(-1, 2).tolist()]
-        lines += [
-            "f " + " ".join(f"{p}/{t}" for p, t in zip(corners, of_chart))
-            for corners, of_chart in zip(places.tolist(), texture.tolist())
-        ]
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
-
-
-def write_obstacle(part: Path, scene: BuiltScene, obstacle: Obstacle) -> None:
-    """Write the obstacle in every frame."""
-    times = np.arange(len(obstacle.positions)) * scene.dt
-    write_point_cache(part / "obstacle.pc2", Trajectory(obstacle.positions, obstacle.faces, times))
-    rest: dict[str, Any] = {}
-    if scene.dressed is not None:
-        rest["rest_positions"] = scene.dressed.body.shaped(scene.dressed.betas)
-    rest |= {"positions": obstacle.positions, "faces": obstacle.faces, "fps": 1.0 / scene.dt}
-    np.savez(part / "obstacle.npz", **rest)
+def _write_arrays(path: Path, **arrays: Any) -> None:
+    """Write an npz of the arrays that there are."""
+    np.savez(path, **{name: array for name, array in arrays.items() if array is not None})
 
 
 def write_motion(part: Path, worn: Dressed) -> None:
     """Write the poses in two layouts, and the skinning of the garment."""
-    body, motion, garment = worn.body, worn.motion, worn.garment
+    from snug.body.skeleton import axis_angles, rotation_matrices
     from snug.networks.dressed_body import DressedBody
     from snug.recipe import DEFAULT
 
-    joints = body.joints(worn.betas)
+    body, motion, garment, before = worn.body, worn.motion, worn.garment, worn.before
+    joints, frames = body.joints(worn.betas), motion.frames
     betas = np.zeros(body.shape_count) if worn.betas is None else np.asarray(worn.betas)
-    frames = motion.frames
-    earlier: dict[str, Any] = {}
-    if (before := worn.before) is not None:
-        earlier["poses_before"] = before.poses.reshape(before.frames, -1)
-        earlier["trans_before"] = before.translations
-    np.savez(
+    _write_arrays(
         part / "motion_smpl.npz", poses=motion.poses.reshape(frames, -1), trans=motion.translations,
-        betas=betas, fps=motion.fps, **earlier,
+        betas=betas, fps=motion.fps,
+        poses_before=None if before is None else before.poses.reshape(before.frames, -1),
+        trans_before=None if before is None else before.translations,
     )  # fmt: skip
-    from snug.body.skeleton import axis_angles, rotation_matrices
-
     poses = np.zeros((frames, 22 + FINGERS, 3))
     poses[:, :22] = motion.poses[:, :22]
     poses[:, 0] = axis_angles(Z_UP @ rotation_matrices(motion.poses[:, 0]))
-    trans = (joints[0] + motion.translations) @ Z_UP.T - joints[0]
-    np.savez(
-        part / "motion_amass.npz", poses=poses.reshape(frames, -1), trans=trans, betas=np.pad(betas, (0, 6)),
+    _write_arrays(
+        part / "motion_amass.npz", poses=poses.reshape(frames, -1), betas=np.pad(betas, (0, 6)),
+        trans=(joints[0] + motion.translations) @ Z_UP.T - joints[0],
         gender=np.array("neutral"), mocap_framerate=motion.fps,
     )  # fmt: skip
     smoothed = DressedBody(body, garment).weights(DEFAULT.smoothing).double().numpy()
-    loops: dict[str, Any] = {f"loop_{name}": loop for name, loop in garment.loops.items()}
-    np.savez(
+    _write_arrays(
         part / "skinning.npz", weights=garment.skinning_weights, smoothed_weights=smoothed,
         rest_positions=garment.rest_for(body, worn.betas), joints=joints, parents=body.parents,
         transforms=body.transforms(motion.poses, motion.translations, worn.betas),
-        **loops,
+        **{f"loop_{name}": loop for name, loop in garment.loops.items()},
     )  # fmt: skip
 
 
@@ -181,7 +149,7 @@ def facts_of(scene: BuiltScene) -> dict[str, Any]:
         "triangles": len(scene.cloth.faces),
         "before": 0 if scene.dressed is None or scene.dressed.before is None else scene.dressed.before.frames,
         "gravity": [0.0, -GRAVITY, 0.0],
-        "material": {name: getattr(material, name) for name in material.__dataclass_fields__}
+        "material": asdict(material)
         | {"lame_lambda_N_per_m": material.lame_lambda, "lame_mu_N_per_m": material.lame_mu},
         "energies": {term.name: term.parameters() for term in scene.energies},
         "contact_region_m": None if scene.obstacle is None else scene.obstacle.region,
@@ -215,19 +183,13 @@ def write_scene(
         }  # fmt: skip
         write_scene_files(part, scene, facts)
         if simulation is not None:
-            write_reference(part, scene, simulation)
+            simulation.prepare(scene)
+            trajectory = simulation.run()
+            trajectory.save(part / "reference.vtkhdf")
+            write_point_cache(part / "reference.pc2", trajectory)
+            positions, faces = trajectory.positions, trajectory.faces
+            np.savez(part / "reference.npz", positions=positions, faces=faces, fps=1.0 / scene.dt)
         (part / "README.txt").write_text(readme(facts, score), encoding="utf-8")
-
-
-def write_reference(part: Path, scene: BuiltScene, method: Method) -> None:
-    """Simulate the scene, and write the trajectory in three formats."""
-    method.prepare(scene)
-    trajectory = method.run()
-    trajectory.save(part / "reference.vtkhdf")
-    write_point_cache(part / "reference.pc2", trajectory)
-    np.savez(
-        part / "reference.npz", positions=trajectory.positions, faces=trajectory.faces, fps=1.0 / scene.dt
-    )
 
 
 def readme(facts: dict[str, Any], score: str) -> str:

@@ -111,24 +111,6 @@ def mean_curvature(positions: Floats, faces: NDArray[np.int64]) -> tuple[Floats,
     >>> round(float(mean_curvature(x, faces)[0].mean()), 3)
     4.0
     """
-    laplacian, area = laplacian_and_areas(positions, faces)
-    norm = np.linalg.norm(laplacian, axis=-1)
-    curvature = np.divide(norm, 4.0 * area, out=np.zeros(area.shape), where=area > np.finfo(float).tiny)
-    return curvature, area
-
-
-def laplacian_and_areas(positions: Floats, faces: NDArray[np.int64]) -> tuple[Floats, Floats]:
-    """Return sum_j (cot a_ij + cot b_ij) (x_i - x_j) and the mixed Voronoi area A_i of each vertex.
-
-    It is 4 A_i times the mean curvature, along the normal: outwards where the surface is convex.
-
-    Args:
-        positions: (...,V,3) [m].
-        faces: (F,3).
-
-    Returns:
-        Vectors (...,V,3) [m] and areas (...,V) [m^2].
-    """
     vertices = positions.shape[-2]
     corners = positions.reshape(-1, vertices, 3)[:, faces]  # (T,F,3,3)
     opposite = np.roll(corners, -1, axis=2) - np.roll(corners, -2, axis=2)  # edge facing each corner
@@ -150,11 +132,13 @@ def laplacian_and_areas(positions: Floats, faces: NDArray[np.int64]) -> tuple[Fl
     area = np.asarray(np.bincount(places.ravel(), areas_of_corners.ravel(), count), dtype=float)
     pulls = cotangents[..., None] * opposite
     after, before = np.roll(places, -1, axis=2).ravel(), np.roll(places, -2, axis=2).ravel()
-    laplacian = np.empty((count, 3))
+    laplacian = np.empty((count, 3))  # sum_j (cot a_ij + cot b_ij) (x_i - x_j)
     for axis in range(3):
         pull = pulls[..., axis].ravel()
         laplacian[:, axis] = np.bincount(after, pull, count) - np.bincount(before, pull, count)
-    return laplacian.reshape(positions.shape), area.reshape(positions.shape[:-1])
+    norm = np.linalg.norm(laplacian, axis=-1)
+    curvature = np.divide(norm, 4.0 * area, out=np.zeros(area.shape), where=area > tiny)
+    return curvature.reshape(positions.shape[:-1]), area.reshape(positions.shape[:-1])
 
 
 @dataclass(frozen=True)

@@ -38,11 +38,6 @@ SHORTEST = 8  # frames of which a motion can be said
 NO_MOTION = 1e-6  # [m] rms of a dynamic part that is none
 
 
-def in_root_frame(positions: Array, rotations: Array, origins: Array) -> Array:
-    """Return positions (T,V,3) [m] in the axes of the root: rotations (T,3,3) to world, origins (T,3) [m]."""
-    return np.einsum("tji,tvj->tvi", rotations, positions - origins[:, None])
-
-
 def dynamic_part(moving: Array, static: Array) -> Array:
     """Return D (T,H,3) [m] of a hem and its quasi-static solution, both (T,H,3) in the root frame."""
     difference = moving - static
@@ -136,17 +131,10 @@ class HemMotion:
     first: int = 0
 
     def of(self, positions: Array) -> Array:
-        """Return the hem (T,H,3) in the root frame of positions (T,V,3) [m]."""
+        """Return the hem (T,H,3) [m] of positions (T,V,3) [m] in the axes of the root."""
         frames = len(positions)
-        return in_root_frame(positions[:, self.hem], self.axes[:frames], self.origins[:frames])
-
-    def curves(self, positions: Array) -> dict[str, Array]:
-        """Return curves over time: yaw of the hem against the root [rad], its rms distance to its end [m]."""
-        hem = self.of(positions)
-        # In the root's own axes the root does not turn: what is left is the hem's lead and overshoot.
-        root = np.broadcast_to(np.eye(3), (len(hem), 3, 3))
-        away = np.sqrt(((hem - hem[-1]) ** 2).sum(axis=-1).mean(axis=-1))
-        return {"hem/yaw": hem_yaw(hem, root), "hem/from_end": away}
+        from_root = positions[:, self.hem] - self.origins[:frames, None]
+        return np.einsum("tji,tvj->tvi", self.axes[:frames], from_root)
 
     def measure(self, positions: Array, static: Array | None = None) -> dict[str, float]:
         """Return dynamic metrics of positions (T,V,3), [1] or [frames]; undefined ones left out.
@@ -171,9 +159,7 @@ class HemMotion:
         return {name: value for name, value in values.items() if np.isfinite(value)}
 
 
-COMMON = {
-    "amplitude": "Hem amplitude", "correlation": "Correlation", "gain": "Gain", "lag": "Lag"
-}  # fmt: skip
+COMMON = (("amplitude", "Hem amplitude"), ("correlation", "Correlation"), ("gain", "Gain"), ("lag", "Lag"))
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
@@ -213,13 +199,6 @@ def shares_quasi_static(entry: MethodEntry) -> bool:
     return entry.static_known and entry.role in ("reference", "reference-variant", "solver")
 
 
-def series(roll_out: RollOut) -> dict[str, np.ndarray]:
-    """Return curves of the hem to be drawn over time."""
-    reference = roll_out.group.reference
-    hem = None if reference is None else reference.kept(hem_motion)
-    return {} if hem is None else hem.curves(roll_out.positions)
-
-
 def hem_motion(reference: RollOut) -> HemMotion | None:
     """Return the frame of reference of the scene's hems; None without a body or a quasi-static solution."""
     group, dressed = reference.group, reference.scene.dressed
@@ -254,8 +233,8 @@ DYNAMICS = Measurements(
         *((f"dynamics/common_{name}", "frames" if name == "lag" else "1", f"{title}, common",
            f"{title.lower()}, with every method's dynamic part taken from the simulator's answer to poses "
            "held still", {"table": "" if name in ("gain", "lag") else "dynamics"})
-          for name, title in COMMON.items()),
+          for name, title in COMMON),
         table="dynamics",
     ),
-    measure=measure, compare=compare, series=series,
+    measure=measure, compare=compare,
 )  # fmt: skip

@@ -90,9 +90,7 @@ def first_guess(scene: BuiltScene, previous: Floats, velocity: Floats, frame: in
 FIRST_FULL_FRAME = 2
 
 
-def energy_series(
-    scene: BuiltScene, trajectories: Sequence[NDArray[np.float64]]
-) -> list[dict[str, NDArray[np.float64]]]:
+def energy_series(scene: BuiltScene, trajectories: Sequence[Floats]) -> list[dict[str, Floats]]:
     """Return energies of each trajectory: term -> (T,) [J], plus "total".
 
     Frames are the outer loop: what belongs to a frame alone, as an obstacle's search tree, is made once.
@@ -120,9 +118,7 @@ def energy_series(
     return tables
 
 
-def _terms_at(
-    scene: BuiltScene, terms: Sequence[Energy], positions: NDArray[np.float64], frame: int
-) -> dict[str, float]:
+def _terms_at(scene: BuiltScene, terms: Sequence[Energy], positions: Floats, frame: int) -> dict[str, float]:
     x = np.ascontiguousarray(positions[frame])
     step = step_to(scene, positions, frame, guess=x)
     values = {}
@@ -143,18 +139,19 @@ def measure_energy(roll_out: RollOut) -> dict[str, float]:
     return {f"energy/{term}": float(series[roll_out.judged].mean()) for term, series in by_term.items()}
 
 
-def series(roll_out: RollOut) -> dict[str, NDArray[np.float64]]:
+def series(roll_out: RollOut) -> dict[str, Floats]:
     """Return energies of every frame, (T,) [J] each."""
     return {f"energy/{term}": series for term, series in energies(roll_out).items()}
 
 
-def energies(roll_out: RollOut) -> dict[str, NDArray[np.float64]]:
+def energies(roll_out: RollOut) -> dict[str, Floats]:
     """Return term -> (T,) [J], and "total"; computed for all roll-outs of the scene at once."""
-    return roll_out.group.kept(_of_all)[roll_out.place]
+    return roll_out.group.kept(_of_all)[roll_out]
 
 
-def _of_all(group: SceneRollOuts) -> list[dict[str, NDArray[np.float64]]]:
-    return energy_series(group.scene, group.positions)
+def _of_all(group: SceneRollOuts) -> dict[RollOut, dict[str, Floats]]:
+    positions = [roll_out.positions for roll_out in group.roll_outs]
+    return dict(zip(group.roll_outs, energy_series(group.scene, positions)))
 
 
 def measure_printed_bending(roll_out: RollOut) -> dict[str, float]:

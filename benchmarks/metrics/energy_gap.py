@@ -55,9 +55,7 @@ MEANS = (
 def measure(roll_out: RollOut) -> dict[str, float | Estimate]:
     """Return gaps, one-step distances and the gradient left, of the sampled frames."""
     group = roll_out.group
-    scale = group.kept(gap_scale)
-    values: dict[str, float | Estimate] = {}
-    values |= roll_out.kept(_judge_steps).metrics()
+    scale, values = group.kept(gap_scale), roll_out.kept(_judge_steps).metrics()
     if scale is None or not values:
         return values
     gap = values["gap/energy"]
@@ -125,10 +123,10 @@ class Optimality:
             return {}
         return {name: self.estimate(v) for name, v in self.values.items() if v}
 
-    def precise(self, scale: float) -> bool:
-        """Return whether the standard error of the gap is small enough."""
+    def precise(self, negligible: float) -> bool:
+        """Return whether the standard error of the gap is small, or as small as `negligible` [J]."""
         gap = self.estimate(self.values["gap/energy"])
-        return gap.uncertainty <= max(PRECISION * abs(gap.value), NEGLIGIBLE * scale)
+        return gap.uncertainty <= max(PRECISION * abs(gap.value), negligible)
 
 
 def optimality(
@@ -148,8 +146,8 @@ def optimality(
     from reference_sim.minimise.descent import mean_weight
     from reference_sim.minimise.lbfgs import LBFGS  # loads numba
 
-    if scale is not None and not scale > 0.0:  # the reference lies above the first guess, or has no energy
-        scale = None
+    # No scale serves where the reference lies above the first guess, or has no energy.
+    negligible = NEGLIGIBLE * scale if scale is not None and scale > 0.0 else 0.0
     frames = _judged(scene, positions)
     numbers, potential = Optimality(judged=len(frames)), _potential(scene)
     values = numbers.values
@@ -180,7 +178,7 @@ def optimality(
             freeze_step(scene, potential, positions, frame, guess=x)
             again = potential.value(x)
             values["gap/refrozen"].append(again - min(again, minimiser.minimise(x).energy))
-        if len(values["gap/energy"]) >= samples and numbers.precise(scale or 0.0):
+        if len(values["gap/energy"]) >= samples and numbers.precise(negligible):
             break
     return numbers
 

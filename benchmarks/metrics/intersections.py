@@ -29,12 +29,13 @@ MOST_PAIRS = 200_000  # to be tested one by one, in seconds: more have only lost
 
 def measure_triangles(roll_out: RollOut) -> dict[str, float]:
     """Return the share of triangles that intersect another [%] and the length of contours [m]."""
-    from benchmarks.metrics.self_intersections import share_and_contours  # loads numba
+    from benchmarks.metrics.self_intersections import self_intersections  # loads numba
 
-    share, contours = share_and_contours(roll_out.positions[roll_out.judged], roll_out.scene.cloth.faces)
+    faces = roll_out.scene.cloth.faces
+    frames = [self_intersections(np.ascontiguousarray(x), faces) for x in roll_out.positions[roll_out.judged]]
     return {
-        "intersections/triangles": 100.0 * float(share.mean()),
-        "intersections/contours": float(contours.mean()),
+        "intersections/triangles": 100.0 * float(np.mean([hit.mean() for hit, _ in frames])),
+        "intersections/contours": float(np.mean([length for _, length in frames])),
     }
 
 

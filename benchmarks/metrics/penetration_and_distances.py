@@ -22,7 +22,9 @@ DEEP = 5e-3  # [m] below the skin: what an eye sees
 
 
 def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
-    """Return distances [mm] of the same vertices to the reference's."""
+    """Return distances [mm] of the same vertices to the reference's; empty of another mesh."""
+    if roll_out.entry.other_mesh:
+        return {}
     frames = roll_out.judged_beside(reference.positions)
     x, y = roll_out.positions[frames], reference.positions[frames]
     return {
@@ -32,36 +34,39 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
-    """Return penetration into the obstacle."""
+    """Return shares [%] of vertices and area inside the obstacle and depth [mm] over the evaluated frames."""
     scene, x, judged = roll_out.scene, roll_out.positions, roll_out.judged
     if scene.obstacle is None:
         return {}
-    part_depth = own_part_depth(x, scene.obstacle, scene.cloth.rest_positions)[judged]
-    return penetration_values(inside_of(roll_out), judged) | {
-        "penetration/own_part_p999": MM * float(np.percentile(part_depth, 99.9)),
-    }
-
-
-def penetration_values(inside: Penetration, judged: slice) -> dict[str, float]:
-    """Return shares [%] of vertices and area inside an obstacle and depth [mm] over the evaluated frames."""
+    inside = inside_of(roll_out)
     depth = inside.depth[judged]
-    return {
+    values = {
         "penetration/vertices": 100.0 * float(inside.share[judged].mean()),
         "penetration/surface": 100.0 * float(inside.area[judged].mean()),
         "penetration/deep": 100.0 * float((depth > DEEP).mean()),
         "penetration/depth_p99": MM * float(np.percentile(depth, 99)),
     }
+    if not roll_out.entry.other_mesh:
+        part_depth = own_part_depth(x, scene.obstacle, scene.cloth.rest_positions)[judged]
+        values["penetration/own_part_p999"] = MM * float(np.percentile(part_depth, 99.9))
+    return values
 
 
 def inside_of(roll_out: RollOut) -> Penetration:
-    """Return the penetration of a roll-out; computed for all roll-outs of the scene at once."""
-    return roll_out.group.kept(_of_all)[roll_out.place]
+    """Return the penetration of a roll-out; that of all roll-outs of the scene's mesh is computed at once."""
+    group = roll_out.group
+    return group.kept(_of_all)[roll_out] if roll_out in group.roll_outs else _inside([roll_out])[roll_out]
 
 
-def _of_all(group: SceneRollOuts) -> list[Penetration]:
-    assert group.scene.obstacle is not None
-    faces = [roll_out.trajectory.faces for roll_out in group.roll_outs]
-    return penetration(group.positions, faces, group.scene.obstacle)
+def _of_all(group: SceneRollOuts) -> dict[RollOut, Penetration]:
+    return _inside(group.roll_outs)
+
+
+def _inside(roll_outs: Sequence[RollOut]) -> dict[RollOut, Penetration]:
+    obstacle = roll_outs[0].scene.obstacle
+    assert obstacle is not None
+    positions, faces = zip(*((roll_out.positions, roll_out.trajectory.faces) for roll_out in roll_outs))
+    return dict(zip(roll_outs, penetration(positions, faces, obstacle)))
 
 
 def rms(x: Floats, y: Floats) -> float:
@@ -205,7 +210,7 @@ GEOMETRY = Measurements(
          "the fold of a hip does not count"),
         table="penetration", lower_is_better=True,
     ),
-    measure=measure, compare=compare,
+    measure=measure, compare=compare, other_meshes=True,
 )  # fmt: skip
 EXACT = Measurements(
     "exact",

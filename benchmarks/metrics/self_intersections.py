@@ -15,15 +15,6 @@ from reference_sim.kernels.kernel_cache import njit
 Floats = NDArray[np.float64]
 
 
-def share_and_contours(positions: Floats, faces: NDArray[np.int64]) -> tuple[Floats, Floats]:
-    """Return for each frame the share of faces (F,3) that pass through another one, and the contours' length.
-
-    positions: (T,V,3) [m]. Both are (T,), the length in metres.
-    """
-    frames = [self_intersections(np.ascontiguousarray(x), faces) for x in positions]
-    return np.array([hit.mean() for hit, _ in frames]), np.array([length for _, length in frames])
-
-
 def self_intersections(x: Floats, faces: NDArray[np.int64]) -> tuple[NDArray[np.bool_], float]:
     """Return which faces (F,3) of positions (V,3) [m] intersect another, (F,), and the contours' length [m].
 

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.metric import Measurements, metrics_of
-from benchmarks.metrics.penetration_and_distances import MM, penetration, penetration_values
+from benchmarks.metrics.penetration_and_distances import MM
 from reference_sim.geometry.topology import triangle_areas
 
 if TYPE_CHECKING:
@@ -30,15 +30,6 @@ Indices = NDArray[np.int64]
 
 SAMPLED_FRAMES = 12  # frames that are looked at, evenly spread
 LOST = 1e6  # [m] from the origin: a vertex so far off is on no surface, and its square may overflow
-
-
-def measure(roll_out: RollOut) -> dict[str, float]:
-    """Return penetration into the obstacle for a roll-out of another mesh; others have it elsewhere."""
-    obstacle = roll_out.scene.obstacle
-    if obstacle is None or not roll_out.entry.other_mesh:
-        return {}
-    (inside,) = penetration([roll_out.positions], [roll_out.trajectory.faces], obstacle)
-    return penetration_values(inside, roll_out.judged)
 
 
 def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
@@ -115,5 +106,5 @@ SURFACE = Measurements(
          "angle between the normals of the two surfaces at these nearest points, mean as above"),
         table="surface", lower_is_better=True,
     ),
-    measure=measure, compare=compare, other_meshes=True,
+    compare=compare, other_meshes=True,
 )  # fmt: skip

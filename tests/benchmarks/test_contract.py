@@ -94,40 +94,14 @@ def test_the_check_finds_nothing_in_what_keeps_the_contract(tmp_path, monkeypatc
     assert "AttributeError" in look(lambda *, models, seed: object(), tmp_path, monkeypatch)
 
 
-@pytest.fixture
-def in_process(monkeypatch):
-    monkeypatch.setattr(check, "Executor", lambda run, assets, workers: InProcess(run, assets))
-
-
-def test_the_command_checks_what_files_declare(in_process, tmp_path, capsys):
-    (tmp_path / "lifted.py").write_text(SCENE_FILE)
-    (tmp_path / "highest.py").write_text(METRIC_FILE)
-    assert check.main([str(tmp_path / "lifted.py"), str(tmp_path / "highest.py")]) == 0
-    out = capsys.readouterr().out
-    assert "lift: fine\n" in out and "highest.py in hanging_sheet: fine\n" in out
-    assert "nothing is wrong" in out
-    (tmp_path / "narrow.py").write_text("import numpy\n" + METRIC_FILE.replace("float(", "numpy.float32("))
-    assert check.main([str(tmp_path / "narrow.py")]) == 0  # as a run takes it
-    capsys.readouterr()
-    askew = SCENE_FILE.replace("-self.cloth.masses[:, None] *", "-2.0 * self.cloth.masses[:, None] *")
-    (tmp_path / "askew.py").write_text(askew)
-    (tmp_path / "loose.py").write_text(METRIC_FILE.replace("float(", "").replace(".max())", ".max(axis=1)"))
-    assert check.main([str(tmp_path / "askew.py"), str(tmp_path / "loose.py")]) == 1
-    out = capsys.readouterr().out
-    assert "energy lift: its gradient is not the derivative of its value" in out
-    assert "loose.py: TypeError: height/highest is array(" in out and "2 to mend" in out
-
-
-BOUND_FILE = """import numpy as np
-from benchmarks.method import Method, MethodEntry
+METHOD_FILE = """import numpy as np
+from benchmarks import Method, MethodEntry
 from reference_sim import Trajectory
 
-METHODS = (MethodEntry(name="bound", label="Bound", description="", role="solver"),)
+METHODS = (MethodEntry(name="still", description="a method", role="solver"),)
 
-class Bound(Method):
+class Still(Method):
     def prepare(self, scene):
-        if scene.cloth.vertex_count != 49:
-            raise ValueError(f"bound to 49 vertices, not {scene.cloth.vertex_count}")
         self.scene = scene
 
     def run(self):
@@ -135,50 +109,83 @@ class Bound(Method):
         return Trajectory(positions, self.scene.cloth.faces, np.arange(len(positions)) * self.scene.dt)
 
 def make(*, models, seed):
-    return Bound()
+    return Still()
 """
-
-
-JUDGED = (
-    METRIC_FILE
-    + """
+BOUND = """if scene.cloth.vertex_count != 49:
+            raise ValueError(f"bound to 49 vertices, not {scene.cloth.vertex_count}")
+        self.scene = scene"""
+JUDGED = """
 def series(roll_out):
     return {"height/all": roll_out.positions[..., 1]}
 
 def judge(roll_out, values):
-    return SAID
-"""
+    return """
+TWICE, ARRAY = "-2.0 * self.cloth.masses[:, None] *", METRIC_FILE.replace("float(", "")
+FILES = {
+    "lifted": SCENE_FILE,
+    "highest": METRIC_FILE,
+    "narrow": "import numpy\n" + METRIC_FILE.replace("float(", "numpy.float32("),  # as a run takes it
+    "none": METRIC_FILE + JUDGED + "None",
+    "lost": METRIC_FILE + JUDGED + "('diverged', 'lost')",
+    "bound": METHOD_FILE.replace("self.scene = scene", BOUND),
+    "askew": SCENE_FILE.replace("-self.cloth.masses[:, None] *", TWICE),
+    "loose": ARRAY.replace(".max())", ".max(axis=1)"),
+    "word": METRIC_FILE + JUDGED + "'lost'",
+    "taken": METHOD_FILE.replace('"still"', '"snug"'),
+    "empty": "",
+}
+
+
+@pytest.fixture
+def checked(monkeypatch, tmp_path, capsys):
+    """Return what the command prints of a file with that name in FILES, and its exit status."""
+    monkeypatch.setattr(check, "Executor", lambda run, assets, workers: InProcess(run, assets))
+
+    def run(name, *options):
+        (path := tmp_path / f"{name}.py").write_text(FILES[name])
+        status = check.main([str(path), *options])
+        return capsys.readouterr().out, status
+
+    return run
+
+
+@pytest.mark.parametrize("name", ["highest", "narrow", "none", "lost"])
+def test_the_command_finds_nothing_in_metrics_that_can_be_measured(name, checked):
+    assert checked(name)[1] == 0
+
+
+@pytest.mark.parametrize(
+    ("name", "fault"),
+    [
+        ("askew", "energy lift: its gradient is not the derivative of its value"),
+        ("loose", "loose.py: TypeError: height/highest is array("),
+        ("word", "word.py: ValueError: judge() gives 'lost': expected None, or a status"),
+        ("bound", "bound to 49 vertices, not 25"),
+    ],
 )
+def test_the_command_names_what_is_wrong_in_a_file(name, fault, checked):
+    out, status = checked(name)
+    assert status == 1 and fault in out and " to mend" in out
 
 
-def test_a_method_that_is_bound_to_a_mesh_is_checked_in_the_scene_that_has_it(in_process, tmp_path, capsys):
-    path = tmp_path / "bound.py"
-    path.write_text(BOUND_FILE)
-    assert check.main([str(path), "--scene", "hanging_sheet", "--set", "sizes=smoke"]) == 0
-    assert capsys.readouterr().out == "bound in hanging_sheet: fine\nnothing is wrong\n"
-    assert check.main([str(path)]) == 1
-    assert "bound to 49 vertices, not 25" in capsys.readouterr().out
-    (tmp_path / "highest.py").write_text(METRIC_FILE)
-    for arguments in (["hanging"], ["hanging_sheet", "--set", "sizes=tiny"]):
-        assert check.main([str(path), "--scene", *arguments]) == 2
-    assert check.main([str(tmp_path / "highest.py"), "--scene", "hanging_sheet"]) == 2
-    error = capsys.readouterr().err
-    assert (
-        error.count("\n") == 3 and "unknown scene 'hanging'" in error and "declares none of METHODS" in error
-    )
+def test_the_command_checks_scenes_and_methods_in_the_scene_that_they_are_bound_to(checked):
+    assert checked("lifted") == ("lift: fine\nnothing is wrong\n", 0)
+    bound = checked("bound", "--scene", "hanging_sheet", "--set", "sizes=smoke")
+    assert bound == ("still in hanging_sheet: fine\nnothing is wrong\n", 0)
 
 
-def test_the_command_asks_metrics_for_their_judgement_and_takes_curves_of_vertices(
-    in_process, tmp_path, capsys
-):
-    said = {"none": "None", "lost": "('diverged', 'lost')", "word": "'lost'", "no": "0 / 0"}
-    for name, judgement in said.items():
-        (tmp_path / f"{name}.py").write_text(JUDGED.replace("SAID", judgement))
-    assert check.main([str(tmp_path / "none.py"), str(tmp_path / "lost.py")]) == 0
-    assert check.main([str(tmp_path / "word.py"), str(tmp_path / "no.py")]) == 1
-    out = capsys.readouterr().out
-    assert "word.py: ValueError: judge() gives 'lost': expected None, or a status" in out
-    assert "no.py: ZeroDivisionError" in out
+@pytest.mark.parametrize(
+    ("name", "options", "message"),
+    [
+        ("empty", (), "declares none of METHODS, SCENES, METRICS"),
+        ("highest", ("--scene", "hanging_sheet"), "declares none of METHODS"),
+        ("taken", (), "method 'snug' is declared twice"),
+        ("bound", ("--scene", "hanging"), "unknown scene 'hanging'"),
+    ],
+)
+def test_the_check_refuses_what_a_run_refuses(name, options, message, tmp_path, refused):
+    (tmp_path / f"{name}.py").write_text(FILES[name])
+    refused(message, check.main, [str(tmp_path / f"{name}.py"), *options])
 
 
 @pytest.mark.parametrize(("factor", "fine"), [(1.0, True), (0.999, False)])
@@ -195,17 +202,3 @@ def test_a_wrong_gradient_is_found_however_many_vertices_do_not_feel_it(factor, 
     wrong = pytest.raises(ContractError, match="gradient is not the derivative of its value")
     with nullcontext() if fine else wrong:
         check_derivatives(Pulled(sheet.cloth, forces), sheet)
-
-
-@pytest.mark.parametrize(
-    ("source", "message"),
-    [
-        (None, "unwanted.py: no such file"),
-        ("", "declares none of METHODS, SCENES, METRICS"),
-        (BOUND_FILE.replace('name="bound"', 'name="snug"'), "method 'snug' is declared twice"),
-    ],
-)
-def test_the_check_refuses_what_a_run_refuses(source, message, tmp_path, refused):
-    if source is not None:
-        (tmp_path / "unwanted.py").write_text(source)
-    refused(message, check.main, [str(tmp_path / "unwanted.py")])

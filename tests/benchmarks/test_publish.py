@@ -34,11 +34,9 @@ def fall(tmp_path) -> str:
 def test_what_is_published_is_replaced_whole_or_left(tmp_path):
     whole, target = tmp_path / "run", tmp_path / "published" / "run"
     made = "results.csv run.json report.pdf tables/energies.csv figures/lead.png x.vtkhdf"
-    for name in made.split():
-        (whole / name).parent.mkdir(parents=True, exist_ok=True)
-        (whole / name).write_text(name)
-    (target / "tables").mkdir(parents=True)
-    (target / "tables" / "old.csv").write_text("old")
+    for path in [*(whole / name for name in made.split()), target / "tables" / "old.csv"]:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(path.name)
     with pytest.raises(ResultsError, match=r"figures/none\.png: not there"):
         keep(whole, target, ["none.png"])
     assert [path.name for path in target.rglob("*.*")] == ["old.csv"]
@@ -73,34 +71,26 @@ def test_a_run_counts_where_it_ended_and_simulations_stalled_at_worst(
     tmp_path, suite, status, config, usable
 ):
     """benchmarks.run ends with status 1 for a stalled simulation, whose numbers count."""
-    folder = RunFolder(tmp_path)
+    folder, reason = RunFolder(tmp_path), "why" * (status != "ok")
     assert not all_usable(folder)  # no rows yet
     what = (suite, "tshirt/kick", "simulation", 0, "energy/total", "J")
-    row = Row(*what, status=status, reason="why" * (status != "ok"), value=1.0)
-    folder.write_rows([row])
+    folder.write_rows([Row(*what, status=status, reason=reason, value=1.0)])
     folder.write_config(config)
     assert all_usable(folder) == usable
 
 
-def test_changes_that_no_commit_has_and_unknown_names_are_refused(monkeypatch, capsys):
-    monkeypatch.setattr(command, "commit", lambda: "abc+changes")
-    assert command.main(["quick"]) == 2 and "commit the changes first" in capsys.readouterr().err
-    assert command.main(["quik"]) == 2 and "no study 'quik'" in capsys.readouterr().err
-    assert command.main(["smoke"]) == 2 and "study smoke: has no [show]" in capsys.readouterr().err
-
-
-def test_a_run_that_lacks_a_picture_is_left_and_the_next_is_done(monkeypatch, capsys):
-    done = []
-
+def test_the_command_refuses_what_no_commit_has_and_goes_on_after_a_run_that_fails(monkeypatch, capsys):
     def without_picture(name, *_):
-        done.append(name)
-        raise ResultsError(f"{name}/figures/none.png: not there, and the documents show it")
+        raise ResultsError(f"{name}/figures/none.png: not there")
 
-    monkeypatch.setattr(command, "commit", lambda: "abc")
     monkeypatch.setattr(command, "publish", without_picture)
-    assert command.main(["quick", "shapes"]) == 1 and done == ["quick", "shapes"]
-    said = capsys.readouterr().err
-    assert "quick: quick/figures/none.png: not there" in said and "; not published" in said
+    for head, names, status, error in (
+        ("abc+changes", ["quick"], 2, "commit the changes first"),
+        ("abc", ["smoke"], 2, "study smoke: has no [show]"),
+        ("abc", ["quick", "shapes"], 1, "shapes: shapes/figures/none.png: not there; not published"),
+    ):
+        monkeypatch.setattr(command, "commit", lambda head=head: head)
+        assert command.main(names) == status and error in capsys.readouterr().err
 
 
 @pytest.mark.slow

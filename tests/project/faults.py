@@ -148,5 +148,5 @@ FAULTS = (
     Fault("lower half only", "HessianPattern.symmetric", "lower + sp.tril(lower, -1).T", "lower"),
     # the metric that judges
     Fault("curvature over 2 A", "mean_curvature", "np.divide(norm, 4.0 * area", "np.divide(norm, 2.0 * area"),
-    Fault("barycentric cells at half weight", "laplacian_and_areas", "weighted) / 8.0", "weighted) / 6.0"),
+    Fault("barycentric cells at half weight", "mean_curvature", "weighted) / 8.0", "weighted) / 6.0"),
 )  # fmt: skip

@@ -13,7 +13,7 @@ from scipy.linalg import expm
 
 from benchmarks import export, score
 from benchmarks.external.roll_out_files import RollOutOption
-from benchmarks.external.scene_files import facts_of, readme, write_motion, write_obj, write_scene
+from benchmarks.external.scene_files import facts_of, readme, write_motion, write_scene
 from benchmarks.external.scene_fit import expected_positions
 from benchmarks.methods import find_method
 from benchmarks.methods.outside import entry_of
@@ -24,6 +24,7 @@ from benchmarks.runner.measurements import measured
 from benchmarks.scene import Dressed
 from reference_sim import Trajectory
 from reference_sim.files.mesh_files import read_mesh
+from reference_sim.trajectory import write_obj
 from snug.file_options import MotionFileOptions
 from snug.motion.files import read_motion
 from snug.networks.dressed_body import DressedBody
@@ -67,11 +68,7 @@ def skinned_elsewhere(folder: Path, motion: str, turn: np.ndarray) -> np.ndarray
     local = rodrigues(moved["poses"].reshape(frames, -1, 3))
     world, at = np.empty((frames, 24, 3, 3)), np.empty((frames, 24, 3))
     for j, parent in enumerate(parents):
-        rotation = (
-            local[:, j]
-            if j < 22 or motion == "motion_smpl.npz"
-            else np.broadcast_to(np.eye(3), (frames, 3, 3))
-        )
+        rotation = local[:, j] if j < 22 or motion == "motion_smpl.npz" else np.eye(3)[None]
         if parent < 0:
             world[:, j], at[:, j] = rotation, joints[j] + moved["trans"]
         else:
@@ -136,14 +133,13 @@ def test_the_motion_as_amass_has_it_is_the_same_motion(home):
 
 def test_what_is_exported_is_the_scene(home):
     folder, scene = home
-    cloth, obstacle = arrays(folder / "cloth.npz"), arrays(folder / "obstacle.npz")
-    assert np.array_equal(cloth["start_positions"], scene.start) and np.array_equal(
-        cloth["masses"], scene.cloth.masses
-    )
-    assert np.array_equal(obstacle["positions"], scene.obstacle.positions)
-    rest = read_mesh(folder / "rest.obj")
-    assert np.array_equal(rest.positions, scene.cloth.rest_positions)
-    assert np.array_equal(rest.faces, scene.cloth.faces)
+    cloth, rest = arrays(folder / "cloth.npz"), read_mesh(folder / "rest.obj")
+    for written, own in (
+        (cloth["start_positions"], scene.start), (cloth["masses"], scene.cloth.masses),
+        (arrays(folder / "obstacle.npz")["positions"], scene.obstacle.positions),
+        (rest.positions, scene.cloth.rest_positions), (rest.faces, scene.cloth.faces),
+    ):  # fmt: skip
+        assert np.array_equal(written, own)
     facts = json.loads((folder / "scene.json").read_text())
     assert facts["material"]["young_modulus"] == 70e3 and facts["energies"]["collision"]["margin_m"] == 0.004
     assert (facts["fps"], facts["frames"], facts["warm_up_frames"]) == (30.0, 12, 2)

@@ -8,14 +8,15 @@ import pytest
 
 from benchmarks.assets import Assets
 from benchmarks.methods import find_method
-from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.presets import Dependence, find_preset
 from benchmarks.runner.measurements import measured
 from benchmarks.scenes import find_scene
 from snug.body.parametric_body import Body
+from tests.benchmarks.runner.tasks_by_hand import grouped
 
 SIZES = Dependence((200,), 200, (1, 2), 4, 4)
 SCENES = ("dependence/mesh/200", "dependence/dt/60")
+METHODS = ("simulation", "skinning", "newton-1")
 
 
 @pytest.fixture(scope="module")
@@ -29,18 +30,19 @@ def built(name, assets):
     return find_scene(name).at(preset).build(assets)
 
 
+def prepared(name, scene):
+    made = find_method(name).make(models=None, seed=0)
+    made.prepare(scene)
+    return made
+
+
 def test_each_mesh_and_time_step_is_measured_the_same_way(assets):
     value = {}
     for name in SCENES:
         scene = built(name, assets)
-        group = SceneRollOuts(scene)
-        for method in ("simulation", "skinning", "newton-1"):
-            made = find_method(method).make(models=None, seed=0)
-            made.prepare(scene)
-            group.roll_outs.append(RollOut(group, find_method(method), made.run(), suites=("validation",)))
-        for roll_out in group.roll_outs:
-            metrics, _, ended = measured(roll_out, find_scene(name).metrics)
-            assert ended == ("ok", "") and not any(metric.startswith("cost/") for metric in metrics)
+        made = {method: prepared(method, scene).run().positions for method in METHODS}
+        for roll_out in grouped(scene, made, suites=("validation",)).roll_outs:
+            metrics = measured(roll_out, find_scene(name).metrics)[0]
             value |= {(name, roll_out.entry.name, metric): number for metric, number in metrics.items()}
     for name in SCENES:
         assert abs(value[name, "simulation", "mesh/vertices"] - 200) < 40
@@ -56,10 +58,7 @@ def test_each_mesh_and_time_step_is_measured_the_same_way(assets):
 
 
 def test_time_steps_of_a_frame_are_taken_from_the_scene(assets):
-    taken, scene = [], built("dependence/dt/60", assets)
+    scene = built("dependence/dt/60", assets)
     scene = dataclasses.replace(scene, settle=lambda: scene.cloth.rest_positions)
-    for method in ("simulation", "newton-1", "simulation-dt/4"):
-        made = find_method(method).make(models=None, seed=0)
-        made.prepare(scene)
-        taken.append(made.stepper.substeps)
+    taken = [prepared(name, scene).stepper.substeps for name in ("simulation", "newton-1", "simulation-dt/4")]
     assert taken == [2, 2, 8]  # so many for each of those that a method takes by itself

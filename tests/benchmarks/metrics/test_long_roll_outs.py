@@ -7,9 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.assets import Assets
 from benchmarks.methods import find_method
-from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics import roll_out as metric
 from benchmarks.presets import PRESETS
 from benchmarks.results.run_folder import model_path
@@ -18,29 +16,20 @@ from benchmarks.scenes.hard_motions import ENDS, EVERY, FRAMES, LOOP_BLEND
 from snug.motion.library import make_motion
 from snug.networks.roll_out import roll_out
 from snug.training.train_network import untrained_model
-from tests.benchmarks.runner.tasks_by_hand import grouped
+from tests.benchmarks.runner.tasks_by_hand import assets_of, grouped
 from tests.snug.training.dressing import swaying, tube_dress
 
 SMOKE = PRESETS[0]
 
 
-def assets_of(dressed, *motions):
-    return Assets(dressed.body, {"tshirt": dressed.garment}, {motion.name: motion for motion in motions}, {})
+def long_scene(dressed):
+    """The walk that comes again, in small."""
+    return find_scene("out_of_distribution/long").at(SMOKE).build(assets_of(dressed, make_motion("walk")))
 
 
 def found_of(scene, x):
     """Return the metric's measurements of the kept frames x (T,V,3) [m]."""
     return metric.measure_long_roll_out(grouped(scene, {"snug": x}).roll_outs[0])
-
-
-def rolled(scene, models, name):
-    """The trajectory of that network, and what is measured of it."""
-    method = find_method(name).make(models=models, seed=0)
-    method.prepare(scene)
-    trajectory = method.run()
-    group = SceneRollOuts(scene)
-    group.roll_outs.append(RollOut(group, find_method(name), trajectory))
-    return trajectory, group.roll_outs[0]
 
 
 @pytest.mark.parametrize("frames", [5, 77])
@@ -73,41 +62,35 @@ def test_a_loop_comes_back_to_its_pose_and_goes_on_over_the_ground():
 
 def test_the_long_roll_out_is_the_short_one_carried_on_and_only_some_frames_are_held(tmp_path):
     dressed, walk = tube_dress(), make_motion("walk")
-    scene = find_scene("out_of_distribution/long").at(SMOKE).build(assets_of(dressed, walk))
-    model = untrained_model("snug", dressed, [walk], seed=0)
+    scene, model = long_scene(dressed), untrained_model("snug", dressed, [walk], seed=0)
     model.save(model_path(tmp_path, "snug", 0))
-    trajectory, record = rolled(scene, tmp_path, "snug")
+    method = find_method("snug").make(models=tmp_path, seed=0)
+    method.prepare(scene)
+    x = method.run().positions
     motion, early, late = hard_motions.looped(walk, SMOKE.loop_frames)
     assert set(scene.kept) == {*range(0, SMOKE.loop_frames, EVERY), *early, *late}
     whole = roll_out(model, dressed, motion).positions
-    assert np.array_equal(trajectory.positions, whole[scene.kept])
+    assert np.array_equal(x, whole[scene.kept])
     assert [scene.kept[places].tolist() for places in scene.repeated] == [early.tolist(), late.tolist()]
     bare = dressed.skinned(motion, smoothing=20)
-    assert record.group.scene.skinned == pytest.approx(bare[scene.kept], abs=1e-12)
+    assert scene.skinned == pytest.approx(bare[scene.kept], abs=1e-12)
     # The state of an untrained network is soon forgotten.
-    assert 0.0 < metric.measure_long_roll_out(record)["roll_out/drift"] < 1.0
+    assert 0.0 < found_of(scene, x)["roll_out/drift"] < 1.0
 
 
 def test_a_garment_that_wanders_is_found_out_wherever_the_body_went():
-    dressed, walk = tube_dress(), make_motion("walk")
-    scene = find_scene("out_of_distribution/long").at(SMOKE).build(assets_of(dressed, walk))
-    motion = scene.dressed.motion
-    x = scene.cloth.rest_positions + motion.translations[scene.kept][:, None]
-
-    def drift(x) -> float:
-        return found_of(scene, x)["roll_out/drift"]
-
-    assert drift(x) < 1e-9
+    scene = long_scene(tube_dress())
+    x = scene.cloth.rest_positions + scene.dressed.motion.translations[scene.kept][:, None]
+    assert found_of(scene, x)["roll_out/drift"] < 1e-9
     x[scene.repeated[1]] += [0.0, 0.003, 0.004]
-    assert drift(x) == pytest.approx(5.0)
+    assert found_of(scene, x)["roll_out/drift"] == pytest.approx(5.0)
     assert found_of(scene, x[:-1]) == {}  # of one that ended early
 
 
 def test_energy_of_a_rigid_flight_is_none_and_a_stop_costs_inertia():
     """Early it flies; late it stops: 5 frames each, the first two of which have no inertia."""
     dressed = tube_dress()
-    scene = find_scene("out_of_distribution/long").at(SMOKE).build(assets_of(dressed, make_motion("walk")))
-    scene = replace(scene, frames=10, repeated=(np.arange(5), np.arange(5, 10)))
+    scene = replace(long_scene(dressed), frames=10, repeated=(np.arange(5), np.arange(5, 10)))
     still = np.repeat(dressed.cloth.rest_positions[None], 10, axis=0)
     bending = found_of(scene, still)["roll_out/first"]
     x = still + 0.1 * np.arange(10)[:, None, None]

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from benchmarks.external.roll_out_files import RollOutFileError, RollOutOption
-from benchmarks.external.scene_files import write_obj
 from benchmarks.scenes.from_roll_out import declared
+from reference_sim.trajectory import write_obj
 from tests.benchmarks.runner.tasks_by_hand import small_scene
 
 SHEET = small_scene("hanging_sheet", cells=4, frames=5)
@@ -26,7 +26,7 @@ def declare(folder: Path, *, rest_scale: float = 1.0, body: np.ndarray = STANDIN
         folder / "pred.npz", positions=positions, faces=SHEET.cloth.faces, obstacle=obstacle,
         obstacle_faces=TETRAHEDRON,
     )  # fmt: skip
-    write_obj(folder / "rest.obj", rest_scale * SHEET.cloth.rest_positions, SHEET.cloth.faces, None)
+    write_obj(folder / "rest.obj", rest_scale * SHEET.cloth.rest_positions, SHEET.cloth.faces)
     option = RollOutOption("pred", str(folder / "pred.npz"), up=up)
     return declared(option, str(folder / "rest.obj"))
 
