@@ -5,7 +5,6 @@ from __future__ import annotations
 import sys
 import tempfile
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -142,27 +141,23 @@ def name_of(cell: Cell) -> str:
 # --- tasks that check what they run ------------------------------------------------------------------------
 
 
-@contextmanager
-def located(cell: Cell) -> Iterator[None]:
-    """Raise ContractError with file and line for what a user's code raises within."""
-    try:
-        yield
-    except (ContractError, RunStopped):
-        raise
-    except Exception as error:
-        where = raised_at(error, cell.entry.declared_in or cell.scene.declared_in)
-        raise ContractError(f"{one_line(error)}{f' ({where})' if where else ''}") from None
-
-
 def run_checked(cell: Cell, least: float, context: Context, needed: Needed) -> Outcome:
-    """Run a cell, and check what a user's scene and method do."""
+    """Run a cell, and check what a user's scene and method do.
+
+    Raises ContractError, for what a user's code raises with file and line.
+    """
     entry, models = cell.entry, context.folder.models_of(cell.scene.garment)
-    with located(cell):
+    try:
         if cell.scene.declared_in:
             check_scene(cell.scene, context.assets)
         outcome = compute_cell(cell, least, context)
         if entry.declared_in and not outcome.failed:
             check_method(entry, scene_of(cell, context), partial(entry.make, models=models), cell.seed)
+    except (ContractError, RunStopped):
+        raise
+    except Exception as error:
+        where = raised_at(error, entry.declared_in or cell.scene.declared_in)
+        raise ContractError(f"{one_line(error)}{f' ({where})' if where else ''}") from None
     return outcome
 
 

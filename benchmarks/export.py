@@ -2,18 +2,17 @@
 
 from __future__ import annotations
 
-import argparse
-import shlex
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.methods import find_method
 from benchmarks.plan.make_plan import plan_scene
-from benchmarks.plan.options import OF_SCENES, add_study_options, study_of
+from benchmarks.plan.options import add_study_options, study_of
 from benchmarks.plan.study import StudyError
 from benchmarks.timing import one_thread
 from reference_sim.command_line import Parser, command
+from reference_sim.files.atomic_files import demand_new
 
 PROGRAM = "benchmarks.export"
 EXAMPLES = """examples:
@@ -31,8 +30,10 @@ exit status: 0 written; 2 the scene is not known or cannot be made, or the folde
   why and nothing is written; 130 interrupted."""
 
 
-def make_export_parser() -> argparse.ArgumentParser:
-    """Return the parser of the command."""
+@command(PROGRAM)
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; return its exit status."""
+    one_thread()
     parser = Parser(
         prog=f"python -m {PROGRAM}",
         description="Write a scene as plain files: rest mesh, weights, material, motion, posed body, start.",
@@ -43,16 +44,7 @@ def make_export_parser() -> argparse.ArgumentParser:
     add("-o", "--out", required=True, metavar="DIR", help="a new or empty folder; of training motions a file")
     add("--reference", action="store_true", help="simulate the scene, and write the trajectory too")
     add_study_options(parser)
-    return parser
-
-
-@command(PROGRAM)
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; return its exit status."""
-    one_thread()
-    options = make_export_parser().parse_args(arguments)
-    from reference_sim.files.atomic_files import demand_new
-
+    options = parser.parse_args(arguments)
     folder = Path(options.out)
     garment, _, motion = options.scene.rpartition("/")
     if motion == "training-motions":
@@ -67,28 +59,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         scene = plan.scenes[0].build(plan.open_assets() if plan.garments else None)
         from benchmarks.external.scene_files import write_scene  # loads the simulator
 
-        chosen = ["--scene", options.scene, *scene_arguments(options)]
-        line = shlex.join(["python", "-m", "benchmarks.score", "mine.npz", *chosen])
-        score = "" if plan.scenes[0].networks_only else line
         simulation = find_method("simulation").make(models=folder, seed=0) if options.reference else None
-        write_scene(
-            folder, plan.scenes[0], scene, preset=plan.preset.name, score=score, simulation=simulation
-        )
+        write_scene(folder, plan.scenes[0], scene, preset=plan.preset.name, simulation=simulation)
     except RuntimeError as error:  # a simulation that did not stay finite
         raise StudyError(str(error)) from error
     print(f"{scene.name}: {scene.frames} frames of {scene.cloth.vertex_count} vertices in {folder}")
     return 0
-
-
-def scene_arguments(options: argparse.Namespace) -> list[str]:
-    """Return the options of a scene that were given, as arguments of another command."""
-    arguments = []
-    for name in ("settings", *OF_SCENES):
-        given = getattr(options, name) or []
-        # With "=", a value that begins with a hyphen is not taken for another option.
-        word = "--set" if name == "settings" else f"--{name.replace('_', '-')}"
-        arguments += [f"{word}={value}" for value in (given if isinstance(given, list) else [given])]
-    return arguments
 
 
 if __name__ == "__main__":

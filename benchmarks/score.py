@@ -5,7 +5,6 @@ A thin command: the roll-out is a method of an ordinary run, beside the simulati
 
 from __future__ import annotations
 
-import argparse
 import contextlib
 import io
 import json
@@ -57,8 +56,11 @@ exit status: 0 scored; 1 something failed, a line says what; 2 the roll-out cann
   to the scene: one line says why and nothing is written; 130 interrupted."""
 
 
-def make_parser() -> argparse.ArgumentParser:
-    """Return the parser of the command."""
+@command(PROGRAM)
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command; return its exit status."""
+    command_line = list(sys.argv[1:] if arguments is None else arguments)
+    one_thread()
     parser = Parser(
         prog=f"python -m {PROGRAM}",
         description="Energies, gap to the minimum of each step, curvature, depth, dynamics of "
@@ -76,23 +78,17 @@ def make_parser() -> argparse.ArgumentParser:
     reference = parser.add_mutually_exclusive_group()
     reference.add_argument("--reference", metavar="FILE",
         help="compare with this roll-out (metres, y up) instead of simulating the scene")  # fmt: skip
-    reference.add_argument("--no-reference", action="store_true", help="leave out what needs a reference")
+    reference.add_argument("--no-reference", dest="reference", action="store_false",
+        help="leave out what needs a reference")  # fmt: skip
     add("--json", action="store_true",
         help="print all numbers of the roll-out as one JSON object in place of the line: no figures, page "
         "and PDF, and no times and gaps of what it is compared with")  # fmt: skip
     add("-o", "--out", metavar="DIR", help="folder of the run (default: a new one under reports/runs/)")
-    return parser
-
-
-@command(PROGRAM)
-def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; return its exit status."""
-    command_line = list(sys.argv[1:] if arguments is None else arguments)
-    one_thread()
-    options = make_parser().parse_args(command_line)
+    parser.set_defaults(reference=None)
+    options = parser.parse_args(command_line)
     plan = plan_score(
         study_of(options), options.roll_out, options.scene or "",
-        rest_mesh=options.rest_mesh, reference=False if options.no_reference else options.reference,
+        rest_mesh=options.rest_mesh, reference=options.reference,
         report=not options.json, folder=Path(options.out) if options.out else None,
         command_line=shlex.join(["python", "-m", PROGRAM, *command_line]),
     )  # fmt: skip

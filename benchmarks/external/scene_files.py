@@ -62,8 +62,8 @@ those whose centroid at rest lies within {contact_region_m} m of the sample's.
 SCORED = """\
 Write positions (T,V,3) of all frames, the start included, as mine.npz:
   numpy.savez('mine.npz', positions=positions, fps={rate})
-and have them scored:
-  {score}
+and have them scored, with the --set, --garment, --body and --motions of the export:
+  python -m benchmarks.score mine.npz --scene {scene}
 quasi_static=(T,V,3), the answer to each pose held still, adds the method's own dynamics.
 """
 NOT_SCORED = "The scene is for networks of benchmarks.run alone: no roll-out of a file is scored.\n"
@@ -158,7 +158,7 @@ def facts_of(scene: BuiltScene) -> dict[str, Any]:
 
 
 def write_scene(
-    folder: Path, declared: Scene, scene: BuiltScene, *, preset: str, score: str, simulation: Method | None
+    folder: Path, declared: Scene, scene: BuiltScene, *, preset: str, simulation: Method | None
 ) -> None:
     """Write a scene, as declared and as built, into a new folder.
 
@@ -167,7 +167,6 @@ def write_scene(
         declared: the entry of the scene.
         scene: the same scene, built.
         preset: the name of the preset whose sizes it has.
-        score: the command that scores a roll-out of it; empty: none does.
         simulation: the method whose trajectory is written too; None: none.
 
     Raises:
@@ -189,12 +188,11 @@ def write_scene(
             write_point_cache(part / "reference.pc2", trajectory)
             positions, faces = trajectory.positions, trajectory.faces
             np.savez(part / "reference.npz", positions=positions, faces=faces, fps=1.0 / scene.dt)
-        (part / "README.txt").write_text(readme(facts, score), encoding="utf-8")
+        text = readme(facts, NOT_SCORED if declared.networks_only else SCORED)
+        (part / "README.txt").write_text(text, encoding="utf-8")
 
 
-def readme(facts: dict[str, Any], score: str) -> str:
+def readme(facts: dict[str, Any], scored: str) -> str:
     """Return the text of README.txt: content, units and order of each file, and how to be scored."""
     # All digits: a roll-out is held to the scene's rate.
-    rate = np.format_float_positional(facts["fps"], trim="-")
-    scored = SCORED.format(rate=rate, score=score) if score else NOT_SCORED
-    return README.format(rate=rate, **facts) + scored
+    return (README + scored).format(rate=np.format_float_positional(facts["fps"], trim="-"), **facts)

@@ -11,9 +11,9 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from benchmarks import export, score
+from benchmarks import export
 from benchmarks.external.roll_out_files import RollOutOption
-from benchmarks.external.scene_files import facts_of, readme, write_motion, write_scene
+from benchmarks.external.scene_files import SCORED, facts_of, readme, write_motion, write_scene
 from benchmarks.external.scene_fit import expected_positions
 from benchmarks.methods import find_method
 from benchmarks.methods.outside import entry_of
@@ -45,8 +45,7 @@ def home(tmp_path_factory):
     start = built.start_state
     scene = dataclasses.replace(built, settle=lambda: start)
     folder = tmp_path_factory.mktemp("home") / "scene"
-    score_command = "python -m benchmarks.score mine.npz"
-    write_scene(folder, declared, scene, preset="smoke", score=score_command, simulation=None)
+    write_scene(folder, declared, scene, preset="smoke", simulation=None)
     return folder, scene
 
 
@@ -203,22 +202,11 @@ def test_scenes_without_a_body_are_exported_too(tmp_path, capsys):
     assert capsys.readouterr().err.count("\n") == 2
 
 
-def test_the_command_that_scores_it_takes_back_every_option():
-    options = ["--garment=b.obj", "--set=garment.shift=-0.1,0,0", "--set", "self_contact=true"]
-    options += ["--motions", "clips", "--motions=-c", "--test-motions", "a", "--set", "sizes.frames=40"]
-    given = export.make_export_parser().parse_args(["b/a", "-o", "out", *options])
-    words = ["mine.npz", "--scene", given.scene, *export.scene_arguments(given)]
-    taken = vars(score.make_parser().parse_args(words))
-    kept = {name: value for name, value in vars(given).items() if name not in ("out", "reference")}
-    assert given.settings[0] == "garment.shift=-0.1,0,0" and kept.items() <= taken.items()
-
-
 @pytest.mark.parametrize("step", [1.0 / 30.0, 0.006])
 def test_the_rate_that_the_readme_names_is_that_of_the_scene(step, tmp_path):
     scene = dataclasses.replace(small_scene("hanging_sheet", cells=2, frames=3), dt=step)
     facts = facts_of(scene) | {"preset": "smoke", "description": "a sheet"}
-    text = readme(facts, "python -m benchmarks.score mine.npz")
-    stated = re.search(r"numpy\.savez\(.* fps=(\S+)\)", text)[1]
+    stated = re.search(r"numpy\.savez\(.* fps=(\S+)\)", readme(facts, SCORED))[1]
     assert float(stated) == 1.0 / step and (step == 0.006 or stated == "30")
 
 
