@@ -21,7 +21,6 @@ from reference_sim.files.atomic_files import new_folder
 PROGRAM = "benchmarks.publish"
 WORK = Path("reports/runs/published")
 TARGET = Path("reports/published")
-AGAIN = ("--retry",)  # so a task that lacked memory once is done again
 KEPT = ("results.csv", "frame_energies.csv", "run.json", "report.pdf")
 EXAMPLES = """examples:
   python -m benchmarks.publish shapes                one of them
@@ -49,12 +48,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add("studies", nargs="*", metavar="STUDY", help="names of studies (default: all that have [show])")
     add("-o", "--out", metavar="DIR", default=WORK, type=Path, help=f"where the runs lie (default {WORK})")
     options = parser.parse_args(arguments)
-    known, failed = published_studies(), 0
+    known, head, failed = published_studies(), commit(), 0
     names = options.studies or known
-    for name in names:
-        if read_study(name).show is None:
-            raise StudyError(f"study {name}: has no [show]: the studies {', '.join(known)} do")
-    head = commit()
+    if silent := [name for name in names if read_study(name).show is None]:
+        raise StudyError(f"study {silent[0]}: has no [show]: the studies {', '.join(known)} do")
     if head.endswith("+changes"):
         raise StudyError(f"{head}: commit the changes first, so that a commit says what was run")
     for name in names:  # where one is not published, the next is done all the same
@@ -85,12 +82,12 @@ def publish(name: str, out: Path, into: Path, head: str) -> None:
     """
     show, whole = read_study(name).show, out / Path(name).stem
     assert show is not None
-    _call("benchmarks.run", name, *AGAIN, "-o", str(whole))
+    _call("benchmarks.run", name, "--retry", "-o", str(whole))  # as a task that lacked memory once
     if not all_usable(RunFolder(whole)):
         raise ResultsError(f"{whole}: has failed")
     if others := sorted({row.commit for row in RunFolder(whole).read_rows()} - {head, ""}):
-        reason = f"rows of commit {', '.join(others)}; remove the folder, or check that commit out"
-        raise ResultsError(f"{whole}: {reason}")
+        commits = ", ".join(others)
+        raise ResultsError(f"{whole}: rows of commit {commits}; remove the folder, or check that commit out")
     for film, wanted in show.films.items():
         path = whole / "figures" / film
         path.unlink(missing_ok=True)
@@ -112,9 +109,9 @@ def all_usable(folder: RunFolder) -> bool:
     if not folder.rows_path.is_file():
         return False
     config = folder.read_config()
-    tasks = (facts for of_kind in config.get("tasks", {}).values() for facts in of_kind.values())
-    counted = all(accepted(row) or row.status in USABLE for row in folder.read_rows())
-    return bool(config.get("finished")) and counted and not any("failed" in facts for facts in tasks)
+    failed = ("failed" in facts for kind in config.get("tasks", {}).values() for facts in kind.values())
+    counted = (accepted(row) or row.status in USABLE for row in folder.read_rows())
+    return bool(config.get("finished")) and all(counted) and not any(failed)
 
 
 def keep(whole: Path, target: Path, shown: Sequence[str]) -> None:

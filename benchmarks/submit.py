@@ -194,17 +194,13 @@ def read_entry(path: Path) -> Entry:
 
 
 def check_scores(entry: Entry) -> None:
-    """Raise ValueError for scores of another protocol, or of files that have changed since."""
+    """Raise EntryError for scores of files that have changed since."""
     if not entry.scores.config_path.is_file():
         return
-    config, again = entry.scores.read_config(), "score it again"
-    if (number := (config.get("protocol") or {}).get("number")) != NUMBER:
-        raise EntryError(f"{entry.scores.path}: scores of protocol {number}, this is {NUMBER}: {again}")
-    then, now = config.get("entry") or {}, entry.digests()
+    then, now = entry.scores.read_config().get("entry") or {}, entry.digests()
     if changed := sorted(name for name in then.keys() | now.keys() if then.get(name) != now.get(name)):
-        raise EntryError(
-            f"{entry.path}: not as it was scored: {', '.join(changed)}: put it right, or {again}"
-        )
+        names = ", ".join(changed)
+        raise EntryError(f"{entry.path}: not as it was scored: {names}: put it right, or score it again")
 
 
 def scores_of(entry: Entry, run: RunFolder) -> list[Row]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from contextlib import nullcontext
 
 import numpy as np
@@ -10,89 +9,11 @@ import pytest
 
 from benchmarks import check
 from benchmarks.contract import ContractError, check_derivatives
-from benchmarks.method import Method, MethodEntry
-from benchmarks.plan.cell import Cell
-from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.task import Context, failure
 from benchmarks.validation.equilibrium import DeadLoad
-from reference_sim import Trajectory
-from tests.benchmarks.plan.outside_files import METRIC_FILE, SCENE, SCENE_FILE, TINY, as_before
+from tests.benchmarks.plan.outside_files import METRIC_FILE, SCENE_FILE, as_before
 from tests.benchmarks.runner.tasks_by_hand import InProcess, small_scene
 
-MISBEHAVING = "tests.benchmarks.runner.misbehaving"
-
 _as_before = pytest.fixture(autouse=True)(as_before)
-
-
-class Still(Method):
-    """Does no physics and keeps the contract; `breach` is a line that changes one thing."""
-
-    seed, breach = 0, ""
-
-    def prepare(self, scene):
-        self.scene = scene
-
-    def run(self):
-        x = np.repeat(np.array(self.scene.start)[None], self.scene.frames, axis=0)
-        names = {"x": x, "self": self, "np": np}
-        exec(self.breach, names)
-        times = np.arange(self.scene.frames) * self.scene.dt
-        return Trajectory(names["x"], self.scene.cloth.faces, times, status="ok")
-
-
-ALTERS = "m = self.scene.cloth.masses; m.flags.writeable = True; m[0] *= 2.0"
-BREACHES = {
-    "x = x[:, :-1]": "floats (6, 16, 3) are due",
-    "x[-1, 0] = np.nan": "has a position that is not finite in frame 5",
-    "x[0] += 1e-3": "frame 0 is off the scene's start: put scene.start there",
-    "x[3] += 1e-3": "a pin is off its place in frame 3",
-    "x[2:, -1] += np.random.default_rng().random(3)": "a second run gives other positions",
-    "x[2:, -1] += self.seed": "another seed gives other positions, by 1 m: say seeded=True",
-    "x = self.__dict__.setdefault('x', x)": "each call of run() has to do all of the work",
-    ALTERS: "alters the scene: cloth.masses: copy what you change",
-    "raise RuntimeError('broken on\\npurpose')": "RuntimeError: broken on purpose (",
-}
-
-
-def look(make, tmp_path, monkeypatch, scene="hanging_sheet", **fields) -> str:
-    """Return why the checked run of a method of `make` has failed, empty where it has not."""
-    module = type(sys)("breaches")
-    module.make = make
-    monkeypatch.setitem(sys.modules, "breaches", module)
-    entry = MethodEntry(name="m", description="", module="breaches", declared_in=__file__, **fields)
-    cell = Cell(SCENE[scene].at(TINY), entry, 0, ("speed",))
-    context = Context(RunFolder(tmp_path))
-    try:
-        outcome = check.run_checked(cell, 0.02, context, {})
-    except Exception as error:
-        outcome = failure(error)
-    return outcome.reason
-
-
-@pytest.mark.parametrize("breach", BREACHES)
-def test_the_check_names_each_breach_and_its_remedy(breach, tmp_path, monkeypatch):
-    def make(*, models, seed):
-        method = Still()
-        method.seed, method.breach = seed, breach
-        return method
-
-    wrong = look(make, tmp_path, monkeypatch)
-    assert BREACHES[breach] in wrong and ";" not in wrong.partition(BREACHES[breach])[2]
-
-
-def test_the_check_finds_nothing_in_what_keeps_the_contract(tmp_path, monkeypatch):
-    assert look(lambda *, models, seed: Still(), tmp_path, monkeypatch) == ""
-
-    class Finer(Still):
-        def run(self):
-            positions = np.zeros((self.scene.frames, 4, 3))
-            times = np.arange(self.scene.frames) * self.scene.dt
-            return Trajectory(positions, np.array([[0, 1, 2], [0, 2, 3]]), times, status="ok")
-
-    assert look(lambda *, models, seed: Finer(), tmp_path, monkeypatch, other_mesh=True) == ""
-    assert "TypeError" in look(lambda *, models: Still(), tmp_path, monkeypatch)
-    assert "AttributeError" in look(lambda *, models, seed: object(), tmp_path, monkeypatch)
-
 
 METHOD_FILE = """import numpy as np
 from benchmarks import Method, MethodEntry
@@ -105,15 +26,29 @@ class Still(Method):
         self.scene = scene
 
     def run(self):
-        positions = np.repeat(np.array(self.scene.start)[None], self.scene.frames, axis=0)
-        return Trajectory(positions, self.scene.cloth.faces, np.arange(len(positions)) * self.scene.dt)
+        scene = self.scene
+        x = np.repeat(np.array(scene.start)[None], scene.frames, axis=0)
+        pass
+        return Trajectory(x, scene.cloth.faces, np.arange(len(x)) * scene.dt)
 
 def make(*, models, seed):
-    return Still()
+    method = Still()
+    method.seed = seed
+    return method
 """
-BOUND = """if scene.cloth.vertex_count != 49:
-            raise ValueError(f"bound to 49 vertices, not {scene.cloth.vertex_count}")
-        self.scene = scene"""
+IN_SHEET = ("--scene", "hanging_sheet", "--set", "sizes=smoke")
+FINER = "return Trajectory(np.zeros((10, 3, 3)), np.array([[0, 1, 2]]), np.arange(10) * scene.dt)"
+BREACHES = {  # a line of run(): what is said of it
+    "x = x[:, :-1]": "floats (10, 49, 3) are due",
+    "x[-1, 0] = np.nan": "has a position that is not finite in frame 9",
+    "x[0] += 1e-3": "frame 0 is off the scene's start: put scene.start there",
+    "x[3] += 1e-3": "a pin is off its place in frame 3",
+    "x[2:, -1] += np.random.default_rng().random(3)": "a second run gives other positions",
+    "x[2:, -1] += self.seed": "another seed gives other positions, by 1 m: say seeded=True",
+    "x = self.__dict__.setdefault('x', x)": "each call of run() has to do all of the work",
+    "m = scene.cloth.masses; m.flags.writeable = True; m[0] *= 2": "alters the scene: cloth.masses: copy",
+    "raise RuntimeError('broken on\\npurpose')": "RuntimeError: broken on purpose (",
+}
 JUDGED = """
 def series(roll_out):
     return {"height/all": roll_out.positions[..., 1]}
@@ -121,71 +56,61 @@ def series(roll_out):
 def judge(roll_out, values):
     return """
 TWICE, ARRAY = "-2.0 * self.cloth.masses[:, None] *", METRIC_FILE.replace("float(", "")
-FILES = {
-    "lifted": SCENE_FILE,
-    "highest": METRIC_FILE,
-    "narrow": "import numpy\n" + METRIC_FILE.replace("float(", "numpy.float32("),  # as a run takes it
-    "none": METRIC_FILE + JUDGED + "None",
-    "lost": METRIC_FILE + JUDGED + "('diverged', 'lost')",
-    "bound": METHOD_FILE.replace("self.scene = scene", BOUND),
-    "askew": SCENE_FILE.replace("-self.cloth.masses[:, None] *", TWICE),
-    "loose": ARRAY.replace(".max())", ".max(axis=1)"),
-    "word": METRIC_FILE + JUDGED + "'lost'",
-    "taken": METHOD_FILE.replace('"still"', '"snug"'),
-    "empty": "",
+FILES = {  # a file: what is wrong with it
+    METHOD_FILE: "",
+    METHOD_FILE.replace('"solver"', '"solver", other_mesh=True').replace("pass", FINER): "",
+    METHOD_FILE.replace("*, models, seed", "*, models"): "TypeError",
+    **{METHOD_FILE.replace("pass", line): fault for line, fault in BREACHES.items()},
+    SCENE_FILE: "",
+    SCENE_FILE.replace("-self.cloth.masses[:, None] *", TWICE): "lift: its gradient is not the derivative",
+    METRIC_FILE: "",
+    "import numpy\n" + METRIC_FILE.replace("float(", "numpy.float32("): "",  # as a run takes it
+    METRIC_FILE + JUDGED + "None": "",
+    METRIC_FILE + JUDGED + "('diverged', 'lost')": "",
+    METRIC_FILE + JUDGED + "'lost'": "ValueError: judge() gives 'lost': expected None, or a status",
+    ARRAY.replace(".max())", ".max(axis=1)"): "TypeError: height/highest is array(",
 }
 
 
 @pytest.fixture
-def checked(monkeypatch, tmp_path, capsys):
-    """Return what the command prints of a file with that name in FILES, and its exit status."""
+def file(tmp_path, monkeypatch):
+    """Return the path of a file of that text, which Python has not met; checks run here."""
     monkeypatch.setattr(check, "Executor", lambda run, assets, workers: InProcess(run, assets))
 
-    def run(name, *options):
-        (path := tmp_path / f"{name}.py").write_text(FILES[name])
-        status = check.main([str(path), *options])
-        return capsys.readouterr().out, status
+    def write(text):
+        (path := tmp_path / f"file_{abs(hash(text))}.py").write_text(text)
+        return str(path)
 
-    return run
-
-
-@pytest.mark.parametrize("name", ["highest", "narrow", "none", "lost"])
-def test_the_command_finds_nothing_in_metrics_that_can_be_measured(name, checked):
-    assert checked(name)[1] == 0
+    return write
 
 
-@pytest.mark.parametrize(
-    ("name", "fault"),
-    [
-        ("askew", "energy lift: its gradient is not the derivative of its value"),
-        ("loose", "loose.py: TypeError: height/highest is array("),
-        ("word", "word.py: ValueError: judge() gives 'lost': expected None, or a status"),
-        ("bound", "bound to 49 vertices, not 25"),
-    ],
-)
-def test_the_command_names_what_is_wrong_in_a_file(name, fault, checked):
-    out, status = checked(name)
-    assert status == 1 and fault in out and " to mend" in out
+@pytest.mark.parametrize("number", range(len(FILES)))
+def test_the_command_names_what_is_wrong_in_a_file_and_its_remedy(number, file, capsys):
+    text, fault = list(FILES.items())[number]
+    status = check.main([file(text), *(IN_SHEET if "METHODS" in text else ())])
+    out = capsys.readouterr().out
+    assert status == bool(fault) and fault in out and ";" not in out.partition(fault)[2]
+    assert ("1 to mend" if fault else ": fine\nnothing is wrong") in out
 
 
-def test_the_command_checks_scenes_and_methods_in_the_scene_that_they_are_bound_to(checked):
-    assert checked("lifted") == ("lift: fine\nnothing is wrong\n", 0)
-    bound = checked("bound", "--scene", "hanging_sheet", "--set", "sizes=smoke")
-    assert bound == ("still in hanging_sheet: fine\nnothing is wrong\n", 0)
+def test_a_method_is_checked_in_three_scenes_and_one_that_is_bound_to_a_mesh_where_it_is(file, capsys):
+    bound = "assert scene.cloth.vertex_count == 49, 'bound to 49 vertices'"
+    assert check.main([file(METHOD_FILE.replace("self.scene = scene", f"{bound}; self.scene = scene"))]) == 1
+    out = capsys.readouterr().out
+    assert out.count("bound to 49 vertices") == 3 and "still in tshirt/kick: wrong" in out
 
 
 @pytest.mark.parametrize(
-    ("name", "options", "message"),
+    ("text", "options", "message"),
     [
-        ("empty", (), "declares none of METHODS, SCENES, METRICS"),
-        ("highest", ("--scene", "hanging_sheet"), "declares none of METHODS"),
-        ("taken", (), "method 'snug' is declared twice"),
-        ("bound", ("--scene", "hanging"), "unknown scene 'hanging'"),
+        ("", (), "declares none of METHODS, SCENES, METRICS"),
+        (METRIC_FILE, IN_SHEET, "declares none of METHODS"),
+        (METHOD_FILE.replace('"still"', '"snug"'), (), "method 'snug' is declared twice"),
+        (METHOD_FILE, ("--scene", "hanging"), "unknown scene 'hanging'"),
     ],
 )
-def test_the_check_refuses_what_a_run_refuses(name, options, message, tmp_path, refused):
-    (tmp_path / f"{name}.py").write_text(FILES[name])
-    refused(message, check.main, [str(tmp_path / f"{name}.py"), *options])
+def test_the_check_refuses_what_a_run_refuses(text, options, message, file, refused):
+    refused(message, check.main, [file(text), *options])
 
 
 @pytest.mark.parametrize(("factor", "fine"), [(1.0, True), (0.999, False)])
