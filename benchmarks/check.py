@@ -4,13 +4,18 @@ from __future__ import annotations
 
 import sys
 import tempfile
-from collections.abc import Iterator, Sequence
+import time
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from functools import partial
+from functools import partial, reduce
 from pathlib import Path
+from typing import Any
 
-from benchmarks.contract import ContractError, check_method, check_scene
+import numpy as np
+
+from benchmarks.assets import FEWEST_FRAMES, Assets
 from benchmarks.declarations import DeclarationError, raised_at
+from benchmarks.method import Method, MethodEntry
 from benchmarks.plan import user_files
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.make_plan import make_plan
@@ -18,6 +23,7 @@ from benchmarks.plan.options import add_study_options, study_of
 from benchmarks.plan.plan import Plan
 from benchmarks.plan.study import Part, Study
 from benchmarks.presets import find_preset
+from benchmarks.provenance import digest
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.cells import compute_cell, scene_of
@@ -26,8 +32,11 @@ from benchmarks.runner.isolated_process import one_line
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.runner.task import Context, Needed, Outcome, RunStopped, Task
+from benchmarks.scene import BuiltScene, Scene
 from benchmarks.timing import one_thread
+from reference_sim import Potential, Trajectory
 from reference_sim.command_line import Parser, command
+from reference_sim.energies import Energy, Step
 
 PROGRAM = "benchmarks.check"
 DESCRIPTION = """Run what files of yours declare on tiny scenes, and say what is wrong: methods (shapes,
@@ -48,6 +57,18 @@ KINDS = ("start", "data", "clips", "network", "cell", "batch")  # of tasks that 
 SIZES = replace(
     find_preset("smoke"), garment_vertices=300, frames=8, clip_frames=8, warm_up_frames=2, settle_frames=4,
     sheet_cells=4, sheet_frames=6, cell_seconds=120.0, least_seconds=0.02, repeats=1,
+)  # fmt: skip
+PLACE_TOLERANCE = 1e-6  # [m] of what should be in its place; times a frame's length in float32
+CLOCK_SLACK = 1.1  # of the clock: what frames say of themselves may be more by so much, in all
+DISPLACEMENT = 0.02  # of the mean edge, for the places at which derivatives are compared
+DIFFERENCE_STEP = 1e-6  # [m] of central differences: their error is some 1e-7 of the derivative
+DERIVATIVE_TOLERANCE = 1e-4  # of the norm of the gradient, of the Hessian's largest entry
+SUM_ROUND_OFF = 1e-13  # of a sum of many terms, as a share of it
+DIRECTIONS = 3  # along which derivatives are compared
+UNALTERED = (  # arrays of a scene
+    "cloth.rest_positions", "cloth.faces", "cloth.masses", "start", "start_velocity", "obstacle.positions",
+    "origin_heights", "exact", "dressed.motion.poses", "dressed.motion.translations",
+    "dressed.garment.rest_positions",
 )  # fmt: skip
 
 
@@ -165,6 +186,142 @@ def checked(task: Task) -> Task:
     """Return the task that checks what it runs in place of one that runs a cell."""
     assert isinstance(task.run, partial)
     return replace(task, run=partial(run_checked, *task.run.args)) if task.kind == "cell" else task
+
+
+# --- the contract: what is demanded, each demand with its remedy --------------------------------------------
+
+
+class ContractError(RuntimeError):
+    """Faults of a user's entry, each with its remedy, separated by semicolons."""
+
+
+def demand(*claims: tuple[object, str]) -> None:
+    """Raise ContractError with the texts of all claims that are false."""
+    if wrong := [text for true, text in claims if not true]:
+        raise ContractError("; ".join(wrong))
+
+
+def check_method(entry: MethodEntry, scene: BuiltScene, make: Callable[..., Method], seed: int) -> None:
+    """Run a method twice, and with another seed, and check what it has done.
+
+    Args:
+        entry: of the method.
+        scene: which is to stay as it is.
+        make: called with `seed`, returns a new method.
+        seed: of the first two runs.
+
+    Raises:
+        ContractError: the demands that are not met.
+    """
+    before = fingerprints(scene)
+
+    def run(seed: int) -> tuple[Trajectory, float]:
+        method = make(seed=seed)
+        method.prepare(scene)
+        clock = time.perf_counter()
+        return method.run(), time.perf_counter() - clock
+
+    made, seconds = run(seed)
+    x, stated = np.asarray(made.positions, dtype=np.float64), float(np.nansum(made.frame_seconds))
+    bad = np.flatnonzero(~np.isfinite(x).all(axis=(1, 2)))
+    changed = [name for name, text in fingerprints(scene).items() if before.get(name) != text]
+    near = PLACE_TOLERANCE * max(1.0, np.abs(scene.start).max())
+    pin = "" if entry.other_mesh else loose_pin(x, scene, near)
+    demand(
+        (entry.gives_first_frame or entry.other_mesh or distance(x[0], scene.start) <= near,
+            "frame 0 is off the scene's start: put scene.start there, or say gives_first_frame=True"),
+        (not pin, f"a pin is off its place in {pin}: "
+            "x[cloth.pins] = scene.pin_positions(frame), or the start where that is None"),
+        (entry.other_mesh or np.array_equal(made.faces, scene.cloth.faces),
+            "gives other faces than the scene's: give cloth.faces"),
+        (np.shape(made.times) == (len(x),) and np.allclose(made.times, np.arange(len(x)) * scene.dt),
+            "gives other times than np.arange(frames) * scene.dt"),
+        (not len(bad) or (made.status == "diverged" and made.reason), "has a position that is not finite in "
+            f"frame {bad.min(initial=len(x))}: say status='diverged', and why"),
+        (stated <= CLOCK_SLACK * seconds + PLACE_TOLERANCE, f"its frames say {stated:.3g} s in all, the "
+            f"clock {seconds:.3g} s: give frame_seconds in seconds, of run() alone"),
+        (not changed, f"alters the scene: {', '.join(changed)}: copy what you change, others read it"),
+    )  # fmt: skip
+    again = distance(x, run(seed)[0].positions)
+    demand((again == 0.0, f"a second run gives other positions, by {again:.3g} m: draw all that is random "
+        "from `seed`, keep nothing between objects"))  # fmt: skip
+    if not entry.seeded and entry.trained is None:
+        other = distance(x, run(seed + 1)[0].positions)
+        demand((other == 0.0, f"another seed gives other positions, by {other:.3g} m: say seeded=True"))
+
+
+def loose_pin(x: np.ndarray, scene: BuiltScene, near: float) -> str:
+    """Return the first frame of positions x (T,V,3) [m] in which a pin is farther than `near` off; or ""."""
+    pins = scene.cloth.pins
+    for frame in range(1, len(x)) if scene.dressed is None and len(pins) else ():
+        place = scene.pin_positions(frame) if scene.pin_positions else scene.start[pins]
+        if distance(x[frame][pins], np.asarray(place)) > near:
+            return f"frame {frame}"
+    return ""
+
+
+def distance(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the largest distance [m] of two arrays of positions along an axis."""
+    return float(np.nanmax(np.abs(one - other), initial=0.0)) if one.shape == other.shape else np.inf
+
+
+def fingerprints(scene: BuiltScene) -> dict[str, str]:
+    """Return name -> digest of the arrays of a scene, which nobody may alter."""
+    whole: Any = scene
+    values = {name: reduce(lambda of, a: getattr(of, a, None), name.split("."), whole) for name in UNALTERED}
+    return {name: digest(np.asarray(value)) for name, value in values.items() if value is not None}
+
+
+def check_scene(scene: Scene, assets: Assets | None) -> None:
+    """Build a scene twice and check it. Raises ContractError, and whatever building it raises."""
+    built, again = (scene.build(assets) for _ in range(2))
+    before, after = fingerprints(built), fingerprints(again)
+    changed = [name for name in before if after.get(name) != before[name]]
+    demand(
+        (built.name == scene.name, f"is built as '{built.name}': give name=scene.name"),
+        (built.frames >= FEWEST_FRAMES, f"has {built.frames} frames: {FEWEST_FRAMES} are needed"),
+        (all(energy.cloth is built.cloth for energy in built.energies),
+            "an energy is made of another cloth: use the scene's"),
+        ((built.obstacle is not None) == (scene.obstacle or scene.dressed),
+            "builds an obstacle and declares none, or the reverse: say obstacle=True where it has one"),
+        ((built.dressed is not None) == scene.dressed,
+            "is built dressed and names no garment, or the reverse: say garment= and motion= where it is"),
+        (not changed, f"is built otherwise the second time: {', '.join(changed)}: draw all that is random "
+            "from a fixed seed"),
+    )  # fmt: skip
+    for energy in again.energies:
+        if not type(energy).__module__.startswith("reference_sim."):
+            check_derivatives(energy, again)
+
+
+def check_derivatives(energy: Energy, scene: BuiltScene) -> None:
+    """Compare gradient and Hessian with central differences of value and gradient. Raises ContractError."""
+    cloth, random = scene.cloth, np.random.default_rng(0)
+    edges = cloth.edges
+    length = float(np.linalg.norm(scene.start[edges[:, 0]] - scene.start[edges[:, 1]], axis=1).mean())
+    x = scene.start + DISPLACEMENT * length * random.standard_normal(scene.start.shape)
+    energy.prepare(Step(scene.start, scene.start_velocity, x, scene.dt, scene.obstacle, 1))
+    value, gradient = energy.value_and_gradient(x)
+    what = f"energy {energy.name}: its"
+    finite = np.isfinite(value) and np.shape(gradient) == x.shape and np.isfinite(gradient).all()
+    demand((finite, f"{what} value {value} and gradient {np.shape(gradient)}: give finite ones {x.shape}"))
+    moved = np.abs(gradient).max(axis=1) > 0.0  # elsewhere any direction says the same
+    for _ in range(DIRECTIONS):
+        direction = random.standard_normal(x.shape) * (moved[:, None] if moved.any() else 1.0)
+        ahead, behind = (
+            energy.value_and_gradient(x + sign * DIFFERENCE_STEP * direction) for sign in (1.0, -1.0)
+        )
+        slope, stated = (ahead[0] - behind[0]) / (2.0 * DIFFERENCE_STEP), float((gradient * direction).sum())
+        near = DERIVATIVE_TOLERANCE * np.linalg.norm(gradient) + SUM_ROUND_OFF * abs(value) / DIFFERENCE_STEP
+        demand((abs(slope - stated) <= near, f"{what} gradient is not the derivative of its value: "
+            f"{stated:.6g} N along a direction, differences say {slope:.6g} N"))  # fmt: skip
+    turned = (ahead[1] - behind[1]) / (2.0 * DIFFERENCE_STEP)
+    product = (Potential([energy]).hessian(x) @ direction.ravel()).reshape(x.shape)
+    off, most = float(np.abs(turned - product).max()), float(np.abs(turned).max())
+    round_off = SUM_ROUND_OFF * np.abs(gradient).max() / DIFFERENCE_STEP
+    near = DERIVATIVE_TOLERANCE * max(most, np.abs(product).max()) + round_off
+    demand((off <= near, f"{what} Hessian is not the derivative of its gradient: off by {off:.3g} of "
+        f"{most:.3g} N/m; leave it to automatic differentiation, or mend it"))  # fmt: skip
 
 
 if __name__ == "__main__":

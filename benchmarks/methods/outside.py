@@ -24,10 +24,10 @@ from benchmarks.external.roll_out_files import (
     PLACE,
     RollOutFileError,
     RollOutOption,
+    fit_to_scene,
     read_roll_out,
 )
 from benchmarks.external.scene_files import facts_of, write_scene_files
-from benchmarks.external.scene_fit import fit_to_scene
 from benchmarks.method import Method, MethodEntry, WorkerDied
 from benchmarks.provenance import digest
 from benchmarks.scene import BuiltScene

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks import check
-from benchmarks.contract import ContractError, check_derivatives
+from benchmarks.check import ContractError, check_derivatives
 from benchmarks.validation.equilibrium import DeadLoad
 from tests.benchmarks.plan.outside_files import METRIC_FILE, SCENE_FILE, as_before
 from tests.benchmarks.runner.tasks_by_hand import InProcess, small_scene

@@ -12,9 +12,8 @@ import pytest
 from scipy.linalg import expm
 
 from benchmarks import export
-from benchmarks.external.roll_out_files import RollOutOption
+from benchmarks.external.roll_out_files import RollOutOption, expected_positions
 from benchmarks.external.scene_files import SCORED, facts_of, readme, write_motion, write_scene
-from benchmarks.external.scene_fit import expected_positions
 from benchmarks.methods import find_method
 from benchmarks.methods.outside import entry_of
 from benchmarks.metric import RollOut, SceneRollOuts

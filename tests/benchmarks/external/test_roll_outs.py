@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.external import scene_fit
+from benchmarks.external import roll_out_files
 from benchmarks.external.roll_out_files import (
     RollOutFileError,
     RollOutOption,
@@ -184,12 +184,12 @@ def test_unit_and_axis_are_mended_when_they_are_given(tmp_path):
 def test_a_roll_out_that_explodes_is_a_result_and_one_of_another_motion_is_not(monkeypatch):
     way = np.linspace(0.0, 2.0, SCENE.frames)[:, None, None] * [0.0, 0.0, 1.0]
     carried = SCENE.start + way
-    monkeypatch.setattr(scene_fit, "expected_positions", lambda scene: carried)
+    monkeypatch.setattr(roll_out_files, "expected_positions", lambda scene: carried)
     late = carried.copy()
     late[5:] = np.inf
-    scene_fit.fit_to_scene(StoredRollOut(late), SCENE)
+    roll_out_files.fit_to_scene(StoredRollOut(late), SCENE)
     with pytest.raises(RollOutFileError, match=r"from frame 1 on its centre lies .* where the body carries"):
-        scene_fit.fit_to_scene(StoredRollOut(SCENE.start - way), SCENE)
+        roll_out_files.fit_to_scene(StoredRollOut(SCENE.start - way), SCENE)
 
 
 def test_another_mesh_of_the_same_surface_is_compared_as_a_surface_alone(tmp_path):
