@@ -120,7 +120,7 @@ def plan_of(path: str, study: Study, folder: Path) -> Plan:
     parts = {kind: parts[kind] for kind in declared}
     metrics = (path,) if "metrics" in parts else ()
     plan = make_plan(replace(study, parts=parts, metrics=metrics), folder=folder)
-    cells = (replace(cell, scene=replace(cell.scene, metrics=())) for cell in plan.cells)
+    cells = (replace(cell, scene=replace(cell.scene, metrics=("cost",))) for cell in plan.cells)
     return replace(plan, cells=tuple(cells))
 
 

@@ -35,7 +35,6 @@ if TYPE_CHECKING:
     from benchmarks.metric import RollOut
 
 Floats = NDArray[np.float64]
-BLOCK_FRAMES = 32  # frames
 FLAT = 1e-6  # spread of H times the cloth's length: less is round-off
 
 
@@ -90,55 +89,49 @@ def boundary_mask(faces: NDArray[np.int64], vertices: int) -> NDArray[np.bool_]:
     return mask
 
 
-def mean_curvature(positions: Floats, faces: NDArray[np.int64]) -> tuple[Floats, Floats]:
+def mean_curvature(x: Floats, faces: NDArray[np.int64]) -> tuple[Floats, Floats]:
     """Return the magnitude of mean curvature and the mixed Voronoi area of each vertex.
 
     Values at boundary vertices are returned as computed; mask them with `boundary_mask`. A vertex of zero
     area gets curvature 0 and, as its area is 0, weighs nothing in any mean.
 
     Args:
-        positions: (...,V,3) [m].
+        x: (V,3) [m].
         faces: (F,3).
 
     Returns:
-        Curvature (...,V) [1/m] and area (...,V) [m^2].
+        Curvature (V,) [1/m] and area (V,) [m^2].
 
     Source:
         Meyer, Desbrun, Schröder and Barr 2003; the formula stands at the top of this module.
 
     >>> from benchmarks.meshes import icosphere
-    >>> x, faces = icosphere(3, 0.25)
-    >>> round(float(mean_curvature(x, faces)[0].mean()), 3)
+    >>> round(float(mean_curvature(*icosphere(3, 0.25))[0].mean()), 3)
     4.0
     """
-    vertices = positions.shape[-2]
-    corners = positions.reshape(-1, vertices, 3)[:, faces]  # (T,F,3,3)
-    opposite = np.roll(corners, -1, axis=2) - np.roll(corners, -2, axis=2)  # edge facing each corner
-    squared = (opposite**2).sum(-1)  # (T,F,3) its squared length
-    doubled = np.linalg.norm(np.cross(opposite[:, :, 0], opposite[:, :, 1]), axis=-1)  # twice the area
-    tiny = np.finfo(float).tiny
+    corners, count, tiny = x[faces], len(x), np.finfo(float).tiny  # (F,3,3)
+    opposite = np.roll(corners, -1, axis=1) - np.roll(corners, -2, axis=1)  # edge facing each corner
+    squared = (opposite**2).sum(-1)  # (F,3) its squared length
+    doubled = np.linalg.norm(np.cross(opposite[:, 0], opposite[:, 1]), axis=-1)  # (F,) twice the area
     # cos times the two adjacent lengths, over sin times the same lengths
     dots = 0.5 * squared.sum(-1, keepdims=True) - squared
-    cotangents = dots / np.maximum(doubled, tiny)[..., None]  # (T,F,3)
+    cotangents = dots / np.maximum(doubled, tiny)[:, None]  # (F,3)
 
     weighted = squared * cotangents
     voronoi = (weighted.sum(-1, keepdims=True) - weighted) / 8.0
     obtuse = dots < 0.0
-    share = np.where(obtuse, 0.25, 0.125) * doubled[..., None]
+    share = np.where(obtuse, 0.25, 0.125) * doubled[:, None]
     areas_of_corners = np.where(obtuse.any(-1, keepdims=True), share, voronoi)
 
-    count = len(corners) * vertices
-    places = faces + vertices * np.arange(len(corners))[:, None, None]  # (T,F,3)
-    area = np.asarray(np.bincount(places.ravel(), areas_of_corners.ravel(), count), dtype=float)
+    area = np.asarray(np.bincount(faces.ravel(), areas_of_corners.ravel(), count), dtype=float)
     pulls = cotangents[..., None] * opposite
-    after, before = np.roll(places, -1, axis=2).ravel(), np.roll(places, -2, axis=2).ravel()
+    after, before = np.roll(faces, -1, axis=1).ravel(), np.roll(faces, -2, axis=1).ravel()
     laplacian = np.empty((count, 3))  # sum_j (cot a_ij + cot b_ij) (x_i - x_j)
     for axis in range(3):
         pull = pulls[..., axis].ravel()
         laplacian[:, axis] = np.bincount(after, pull, count) - np.bincount(before, pull, count)
     norm = np.linalg.norm(laplacian, axis=-1)
-    curvature = np.divide(norm, 4.0 * area, out=np.zeros(area.shape), where=area > tiny)
-    return curvature.reshape(positions.shape[:-1]), area.reshape(positions.shape[:-1])
+    return np.divide(norm, 4.0 * area, out=np.zeros(count), where=area > tiny), area
 
 
 @dataclass(frozen=True)
@@ -159,10 +152,8 @@ class CurvatureSeries:
 
 def curvature_series(positions: Floats, faces: NDArray[np.int64]) -> CurvatureSeries:
     """Return curvature and areas of every frame of positions (T,V,3) [m]."""
-    blocks = [
-        positions[first : first + BLOCK_FRAMES] for first in range(0, max(len(positions), 1), BLOCK_FRAMES)
-    ]
-    curvature, area = map(np.concatenate, zip(*(mean_curvature(block, faces) for block in blocks)))
+    frames = [mean_curvature(x, faces) for x in positions]
+    curvature, area = (np.array([pair[k] for pair in frames]).reshape(positions.shape[:2]) for k in (0, 1))
     area[:, boundary_mask(faces, positions.shape[1])] = 0.0
     return CurvatureSeries(curvature, area)
 

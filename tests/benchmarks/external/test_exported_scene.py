@@ -77,19 +77,21 @@ def skinned_elsewhere(folder: Path, motion: str, turn: np.ndarray) -> np.ndarray
     return np.einsum("vj,tvja->tva", given["smoothed_weights"], placed) @ turn.T
 
 
-def measured_of(scene, path: Path) -> dict:
-    """Its rows beside the simulation's, a second opinion left out."""
-    entry = entry_of(RollOutOption("mine", str(path)), scene.name)
+def made_by(name: str, scene) -> Trajectory:
+    method = find_method(name).make(models=Path(), seed=0)
+    method.prepare(scene)
+    return method.run()
+
+
+def rows_beside(scene, entry) -> dict:
+    """The rows of a method beside the simulation's."""
     method = entry.make(models=Path(), seed=0)
     method.prepare(scene)
-    return rows_beside(scene, entry, method.run(), method.quasi_static())
-
-
-def rows_beside(scene, entry, trajectory, static) -> dict:
+    trajectory, still = method.run(), method.quasi_static()
     group = SceneRollOuts(scene)
     group.quasi_static = expected_positions(scene)
     fall = Trajectory(group.quasi_static + 0.01, trajectory.faces, trajectory.times)
-    held = None if static is None else static.positions
+    held = None if still is None else still.positions
     for one, made, static_answer in ((find_method("simulation"), fall, None), (entry, trajectory, held)):
         group.roll_outs.append(RollOut(group, one, made, suites=("garments",), quasi_static=static_answer))
     return measured(group.roll_outs[1])[0]
@@ -97,25 +99,22 @@ def rows_beside(scene, entry, trajectory, static) -> dict:
 
 def test_skinning_made_elsewhere_and_scored_gives_the_numbers_of_the_method(home, tmp_path):
     folder, scene = home
-    inside = find_method("skinning").make(models=Path(), seed=0)
-    inside.prepare(scene)
-    trajectory = inside.run()
-    expected = rows_beside(scene, find_method("skinning"), trajectory, inside.quasi_static())
+    expected, inside = rows_beside(scene, find_method("skinning")), made_by("skinning", scene).positions
+
+    def rows_of_file(**arrays) -> dict:
+        np.savez(tmp_path / "mine.npz", **arrays)
+        return rows_beside(scene, entry_of(RollOutOption("mine", str(tmp_path / "mine.npz")), scene.name))
+
     elsewhere = skinned_elsewhere(folder, "motion_smpl.npz", np.eye(3))
-    assert np.abs(elsewhere - trajectory.positions).max() < 1e-6  # the method computes in float32
-    np.savez(tmp_path / "mine.npz", positions=elsewhere, fps=30.0, quasi_static=elsewhere)
-    metrics = measured_of(scene, tmp_path / "mine.npz")
+    assert np.abs(elsewhere - inside).max() < 1e-6  # the method computes in float32
+    metrics = rows_of_file(positions=elsewhere, fps=30.0, quasi_static=elsewhere)
     assert metrics.keys() == expected.keys() and len(metrics) > 20
     for name, value in expected.items():
         np.testing.assert_allclose(metrics[name], value, rtol=2e-3, atol=2e-5, err_msg=name)
     # The very positions of the method, by way of a file: to the last digit.
-    np.savez(
-        tmp_path / "own.npz", positions=trajectory.positions, fps=30.0, quasi_static=trajectory.positions
-    )
-    assert measured_of(scene, tmp_path / "own.npz") == expected
+    assert rows_of_file(positions=inside, fps=30.0, quasi_static=inside) == expected
     # Without its answer to poses held still, what needs that is left out and nothing else.
-    np.savez(tmp_path / "less.npz", positions=trajectory.positions)
-    less = measured_of(scene, tmp_path / "less.npz")
+    less = rows_of_file(positions=inside)
     assert {name.partition("/")[0] for name in expected.keys() - less.keys()} <= {"dynamics"}
     assert "dynamics/quasi_static_difference" not in less and less.items() <= expected.items()
 
@@ -163,9 +162,7 @@ def test_energies_and_curvature_follow_from_the_exported_files_alone(home, name)
         positions = skinned_elsewhere(folder, "motion_smpl.npz", np.eye(3))
         positions += np.random.default_rng(0).normal(0, 0.03, positions.shape)
     else:
-        method = find_method(name).make(models=Path(), seed=0)
-        method.prepare(scene)
-        positions = method.run().positions
+        positions = made_by(name, scene).positions
     ours, files = energy_series(scene, [positions])[0], exported(folder)
     curvature = curvature_series(positions, scene.cloth.faces).means()
     for frame in (0, 2, 7):
