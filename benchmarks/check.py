@@ -28,10 +28,9 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.cells import compute_cell, scene_of
 from benchmarks.runner.executor import Executor
-from benchmarks.runner.isolated_process import one_line
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.schedule import tasks_of
-from benchmarks.runner.task import Context, Needed, Outcome, RunStopped, Task
+from benchmarks.runner.task import Context, Needed, Outcome, RunStopped, Task, one_line
 from benchmarks.scene import BuiltScene, Scene
 from benchmarks.timing import one_thread
 from reference_sim import Potential, Trajectory

@@ -2,8 +2,7 @@
 
 As digests they make a stored result stale; in words they stand on every row. A task names the folders and
 files that its outcome depends on (benchmarks.runner.schedule); each counts as a whole, and no import is
-followed. Of Python the statements count, not comments, formatting and docstrings. A user's file counts with
-the modules that lie beside it. Packages that it imports count by their version.
+followed. A user's file counts with the modules that lie beside it.
 """
 
 from __future__ import annotations
@@ -16,7 +15,6 @@ import json
 import os
 import platform
 import subprocess
-import sys
 from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
@@ -27,10 +25,9 @@ from typing import Any
 from benchmarks.declarations import DeclarationError
 
 ROOT = Path(__file__).resolve().parents[1]
-# For a reader; what a task depends on is found from the source: see benchmarks.provenance.
-PACKAGES = (
-    "numpy", "scipy", "numba", "torch", "h5py", "scikit-fem", "libigl", "cvxopt", "pymetis", "ipctk",
-    "pyvista", "pyacvd",
+PACKAGES = (  # those that compute, or read what is computed with
+    "numpy", "scipy", "numba", "llvmlite", "torch", "h5py", "scikit-fem", "libigl", "cvxopt", "pymetis",
+    "ipctk", "pyvista", "pyacvd", "meshio", "pandas", "safetensors",
 )  # fmt: skip
 
 
@@ -99,6 +96,7 @@ def hardware_line(facts: dict[str, Any]) -> str:
     return ", ".join(part for part in parts if part)
 
 
+@cache
 def versions() -> dict[str, str]:
     """Return the installed version of each package that computes."""
     return {name: package_version(name) for name in PACKAGES}
@@ -144,35 +142,31 @@ def damaged(folder: Path, digests: Mapping[str, str]) -> str:
     return ""
 
 
-ENCODING = "utf-8-sig"  # Python imports a file that begins with a byte-order mark
-LAYERS = ("reference_sim", "snug", "benchmarks")
 # Prose, compiled kernels; and trained networks: a task that reads one names its digest.
 NO_PART = (".pyc", ".md", ".nbi", ".nbc", ".safetensors")
 # Commands decide no result.
 NO_RESULT = (
     "reference_sim/command_line.py", "reference_sim/simulate.py", "snug/check.py", "snug/train.py",
 )  # fmt: skip
-DOCUMENTED = (ast.Module, ast.ClassDef, ast.FunctionDef, ast.AsyncFunctionDef)
 
 
 def software(*places: str) -> dict[str, str]:
-    """Return place -> digest of its files, and package -> version or "absent" of all that they import.
+    """Return place -> digest of its files, and package -> version or "absent".
 
     Args:
         *places: folders and files of the project, as `snug/body`, and absolute paths of users' files. A place
-            within another one is no part of its own.
+            within another one is no part of its own. With a user's file everything that is installed counts.
 
     Raises:
         DeclarationError: a place that is not there, or a file that cannot be read.
 
-    >>> list(software("benchmarks/declarations.py"))
-    ['benchmarks/declarations.py']
+    >>> list(software("benchmarks/declarations.py"))[:2]
+    ['benchmarks/declarations.py', 'package numpy']
     """
     outermost = sorted(p for p in set(places) if not any(p.startswith(f"{other}/") for other in places))
-    contents = {place: _content(place) for place in outermost}
-    packages = sorted(set().union(*(names for _, names in contents.values())))
-    digests = {place: content for place, (content, _) in contents.items()}
-    return digests | {f"package {name}": _version(name) for name in packages}
+    parts = {place: _content(place) for place in outermost}
+    parts |= {f"package {name}": version for name, version in versions().items()}
+    return parts | ({"installed packages": _installed()} if any(map(os.path.isabs, outermost)) else {})
 
 
 def find_module(module: str) -> str:
@@ -199,28 +193,34 @@ def find_module(module: str) -> str:
 
 def imported_beside(home: str) -> dict[str, Path]:
     """Return name -> file of the modules and packages beside a user's file that it or one of them imports."""
-    top = _top_of(Path(home))
-    names = set().union(*(_read(path)[1] for path in _neighbours(Path(home))))
+    top, names = _top_of(Path(home)), set[str]()
+    for path in _neighbours(Path(home)):
+        with suppress(SyntaxError, ValueError):  # it is not imported: what is was loaded
+            for node in ast.walk(ast.parse(path.read_bytes())):
+                if isinstance(node, ast.Import):
+                    names |= {alias.name.split(".")[0] for alias in node.names}
+                elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
+                    names.add(node.module.split(".")[0])
     files = {name: (top / f"{name}.py", top / name / "__init__.py") for name in sorted(names)}
     return {name: path for name, paths in files.items() for path in paths if path.is_file()}
 
 
 @cache
-def _content(place: str) -> tuple[str, frozenset[str]]:
-    """Return the digest of the files of a place, and the packages that they import."""
+def _content(place: str) -> str:
+    """Return the digest of the files of a place, a folder of the project or a user's file."""
     if Path(place).is_absolute():
         top, paths = _top_of(Path(place)), _neighbours(Path(place))
-        ours = {*LAYERS, *imported_beside(place)}
     else:
-        top, paths, ours = ROOT, _files_of(place), set(LAYERS)
+        top, paths = ROOT, files_of(place)
     if not paths:
         raise DeclarationError(f"{place}: no such folder or file, see benchmarks.runner.schedule")
-    read = {path.relative_to(top).as_posix(): _read(path) for path in paths}
-    packages = frozenset().union(*(names for _, names in read.values()))
-    return digest({name: content for name, (content, _) in read.items()}), packages - ours
+    try:
+        return digest({path.relative_to(top).as_posix(): digest_of_file(path) for path in paths})
+    except OSError as error:
+        raise DeclarationError(f"{place}: cannot be read: {error}") from None
 
 
-def _files_of(place: str) -> list[Path]:
+def files_of(place: str) -> list[Path]:
     """Return the files of the project at a place that count, in order."""
     path = ROOT / place
 
@@ -239,9 +239,9 @@ def _neighbours(home: Path) -> list[Path]:
     Of an installed package they are its own: what is installed beside it counts by its version.
     """
     top = _top_of(home)
-    package = home.relative_to(top).parts[0]
+    installed = top.name in ("site-packages", "dist-packages")
     found = []
-    for folder, folders, names in os.walk(top / package if package in _distributions() else top):
+    for folder, folders, names in os.walk(top / home.relative_to(top).parts[0] if installed else top):
         modules = sorted(name for name in names if name.endswith(".py"))
         folders[:] = sorted(name for name in folders if name.isidentifier()) if modules else []
         found += [Path(folder, name) for name in modules]
@@ -257,34 +257,5 @@ def _top_of(home: Path) -> Path:
 
 
 @cache
-def _read(path: Path) -> tuple[str, frozenset[str]]:
-    """Return the digest of what counts of a file, and the top-level modules that it imports."""
-    try:
-        if path.suffix not in (".py", ".pyi"):
-            return digest_of_file(path), frozenset()
-        tree = ast.parse(path.read_text(encoding=ENCODING))
-    except OSError as error:
-        raise DeclarationError(f"{path}: cannot be read: {error}") from None
-    except (SyntaxError, ValueError):  # beside a user's file, and not imported by it: that was loaded
-        return digest_of_file(path), frozenset()
-    names: set[str] = set()
-    for node in ast.walk(tree):
-        if isinstance(node, ast.Import):
-            names |= {alias.name.split(".")[0] for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            names.add(node.module.split(".")[0])
-        elif isinstance(node, DOCUMENTED) and ast.get_docstring(node, clean=False) is not None:
-            node.body[0].value.value = ""  # type: ignore[attr-defined]
-    return digest(ast.dump(tree).encode()), frozenset(names - sys.stdlib_module_names)
-
-
-@cache
-def _distributions() -> dict[str, list[str]]:
-    return dict(metadata.packages_distributions())
-
-
-@cache
-def _version(package: str) -> str:
-    """Return names and versions of the distributions that an import of this name loads."""
-    names = sorted(set(_distributions().get(package, ())))
-    return ", ".join(f"{name} {metadata.version(name)}" for name in names) or "absent"
+def _installed() -> str:
+    return digest(sorted(f"{package.name} {package.version}" for package in metadata.distributions()))

@@ -87,28 +87,14 @@ def command(
 
 
 SECONDS_OF_A_LOG = 30.0  # between two lines; on a terminal the line is drawn ten times a second
-BELIEVED = 120.0  # [s]: after so long the expected rate counts as much as the measured one
 
 
-def progress_bar(*args: Any, expected_rate: float = 0.0, **options: Any) -> Any:
-    """Return a bar of tqdm with these arguments, on stderr; a file gets a line every half minute.
-
-    expected_rate: [1/s] units that are expected to be done in a second. With it the time left is known from
-    the beginning, when long tasks have begun and none has ended; 0 leaves the estimate to tqdm.
-    """
+def progress_bar(*args: Any, **options: Any) -> Any:
+    """Return a bar of tqdm with these arguments, on stderr; a file gets a line every half minute."""
     from tqdm import tqdm
 
-    class SteadyBar(tqdm):  # type: ignore[type-arg]
-        @property
-        def format_dict(self) -> dict[str, Any]:
-            shown: dict[str, Any] = super().format_dict
-            if expected_rate:
-                done = self.n - self.initial + expected_rate * BELIEVED
-                shown["rate"] = done / (shown["elapsed"] + BELIEVED)
-            return shown
-
     seconds = 0.1 if sys.stderr.isatty() else SECONDS_OF_A_LOG
-    return SteadyBar(*args, mininterval=seconds, maxinterval=max(10.0, seconds), **options)
+    return tqdm(*args, mininterval=seconds, maxinterval=max(10.0, seconds), **options)
 
 
 def announce_compilation() -> None:

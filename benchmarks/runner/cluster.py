@@ -6,8 +6,6 @@ run's folder, which all machines have to see under one path.
 
 from __future__ import annotations
 
-import asyncio
-import dataclasses
 import logging
 import multiprocessing
 import pickle
@@ -19,6 +17,7 @@ import uuid
 from collections.abc import Iterator, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor, wait
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -26,13 +25,12 @@ from benchmarks import provenance
 from benchmarks.assets import Assets
 from benchmarks.provenance import digest_of_file, software
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.executor import TaskProcess, Told
-from benchmarks.runner.isolated_process import one_line
-from benchmarks.runner.task import Needed, Outcome, RunRefused, RunStopped, Task, failure
+from benchmarks.runner.isolated_process import TaskProcess
+from benchmarks.runner.task import Needed, Outcome, RunRefused, RunStopped, Task, one_line
 from benchmarks.timing import one_thread
 
 if TYPE_CHECKING:
-    from distributed import Future
+    from distributed import Client, Future
 
 FIRST = 5.0  # [s] in which a scheduler answers at first
 LOOK = 2.0  # [s] between looks at how many threads there are
@@ -41,27 +39,24 @@ WATCH = 0.5  # [s] between a worker's looks at whether its task is still wanted
 
 
 def check_scheduler(address: str) -> None:
-    """Raise RunRefused unless a scheduler answers; a client of another server would hang."""
+    """Raise RunRefused unless a scheduler answers."""
+    _connect(address, FIRST).close()
+
+
+def _connect(address: str, seconds: float) -> Client:
+    """Return a client of the scheduler, which waits so long for one that was lost. Raises RunRefused."""
     try:
-        from distributed import Security
-        from distributed.core import rpc
+        from distributed import Client
     except ImportError:
         raise RunRefused("--scheduler needs dask.distributed: pip install '.[cluster]'") from None
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said in one line
-
-    async def kind_of_server() -> str:
-        async with rpc(address, connection_args=Security().get_connection_args("client")) as server:
-            return str((await server.identity())["type"])
-
     try:
-        kind = asyncio.run(asyncio.wait_for(kind_of_server(), FIRST))
+        return Client(address, timeout=seconds, name="benchmarks.run", set_as_default=False)
     except Exception as error:  # whatever the bytes of another server lead to, a MemoryError too
-        kind = one_line(error)
-    if kind != "Scheduler":
         raise RunRefused(
-            f"--scheduler {address}: no scheduler of dask answers there ({kind}); start one by `dask "
-            "scheduler` and give the address that it prints, as tcp://HOST:8786"
-        )
+            f"--scheduler {address}: no scheduler of dask answers there ({one_line(error)}); start one by "
+            "`dask scheduler` and give the address that it prints, as tcp://HOST:8786"
+        ) from None
 
 
 class Cluster:
@@ -71,10 +66,7 @@ class Cluster:
     """
 
     def __init__(self, folder: RunFolder, assets: Assets | None, address: str) -> None:
-        check_scheduler(address)
-        from distributed import Client
-
-        self.client = Client(address, timeout=PATIENCE, name="benchmarks.run", set_as_default=False)
+        self.client = _connect(address, PATIENCE)
         self.address, self.folder = address, folder.path.resolve()
         self.assets = self.folder / f".assets-{uuid.uuid4().hex}.part"  # see RunFolder.remove_parts
         self.assets.write_bytes(pickle.dumps(assets))
@@ -94,15 +86,14 @@ class Cluster:
             self._looked = time.monotonic()
         return max(1, self._threads)
 
-    def do(self, tasks: Sequence[Task], needed: Needed, told: Told) -> Iterator[Outcome]:
+    def do(self, tasks: Sequence[Task], needed: Needed) -> Iterator[Outcome]:
         """Yield the outcomes of a batch, done by one process where its worker lives.
 
-        Raises RunStopped where the cluster is gone or cannot do it. Progress is told at the end of a task.
+        Raises RunStopped where the cluster is gone or cannot do it.
         """
         batch, worker = uuid.uuid4().hex, ""
         for task in tasks:
             outcome, worker = self._outcome(task, needed, batch, worker)
-            told(task.seconds)
             yield outcome
 
     def _outcome(self, task: Task, needed: Needed, batch: str, near: str) -> tuple[Outcome, str]:
@@ -191,13 +182,9 @@ def do_task(assets: Path, batch: str, work: bytes) -> tuple[Outcome, str]:
             state = worker.state.tasks.get(key)
             if state is None or state.state == "cancelled":  # by the command, or as it died
                 process.stop()
-    try:
-        outcome = future.result()
-        digests = {name: digest_of_file(assets.parent / name) for name in outcome.files}
-    except OSError as error:  # a file that the task names is not there
-        outcome, digests = failure(error), {}
     hardware = provenance.hardware_line(provenance.hardware())
-    return dataclasses.replace(outcome, digests=digests, origin={"hardware": hardware}), worker.address
+    outcome = future.result()
+    return replace(outcome, origin={"hardware": hardware, **outcome.origin}), worker.address
 
 
 def _process_of(assets: Path, batch: str) -> TaskProcess:

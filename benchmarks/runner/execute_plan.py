@@ -16,12 +16,11 @@ from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.executor import Executor
-from benchmarks.runner.isolated_process import one_line
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.rows import rows_of
 from benchmarks.runner.run_json import RunLog, now
 from benchmarks.runner.schedule import tasks_of
-from benchmarks.runner.task import RunRefused, RunStopped
+from benchmarks.runner.task import RunRefused, RunStopped, one_line
 
 if TYPE_CHECKING:
     from benchmarks.assets import Assets

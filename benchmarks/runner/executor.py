@@ -1,122 +1,43 @@
-"""Executor of tasks: untimed ones side by side on a back end, timed ones alone in processes of this machine.
+"""Executor of tasks: untimed ones side by side, here or on a cluster; timed ones alone on this machine.
 
 A task that raises, exceeds a deadline of its own, or whose process dies is an outcome, not an end of the run.
 """
 
 from __future__ import annotations
 
-import dataclasses
-import os
 import queue
 import threading
-import time
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from contextlib import suppress
 from typing import TYPE_CHECKING
 
 from benchmarks.assets import Assets
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.isolated_process import IsolatedProcess, WorkerDied, tell, tell_nobody
-from benchmarks.runner.task import Context, Needed, Outcome, Task, failure
-from benchmarks.timing import give_back
+from benchmarks.runner.isolated_process import TaskProcess
+from benchmarks.runner.task import Needed, Outcome, Task
 
 if TYPE_CHECKING:
-    from tqdm import tqdm
-
     from benchmarks.runner.cluster import Cluster
 
-COMPILING = 900.0  # [s] for what a process does before its first task: it may have to compile every kernel
 POLL = 0.2  # [s] between looks at what has ended
 MOST = 4096  # threads of this process, each of which waits for a worker
 
-Told = Callable[[float], None]  # is told of progress, in seconds that it was expected to take
 Batch = tuple[Sequence[Task], Needed]
 Done = tuple[Task, Outcome]
 
 
-# --- in the process ----------------------------------------------------------------------------------------
-
-_context: Context
-
-
-def begin_tasks(folder: RunFolder, assets: Assets | None) -> None:
-    """Keep what a process knows. One bar for all that are side by side is enough."""
-    global _context
-    os.environ["TQDM_DISABLE"] = "1"
-    _context = Context(folder, assets)
-
-
-def forget() -> None:
-    """Empty the memo of this process and give back its memory."""
-    if _context.memo:  # else there is no reason to look through all objects for garbage
-        _context.memo.clear()
-        give_back()
-
-
-def perform(run: Callable[[Context, Needed], Outcome], needed: Needed, expected: float) -> Outcome:
-    """Return the outcome of a task, done in this process. expected: its duration [s], told as progress."""
-    shares = [0.0]
-
-    def tell_share(share: float) -> None:
-        shares.append(share)
-        tell(share * expected)
-
-    clock = time.perf_counter()
-    try:
-        outcome = run(dataclasses.replace(_context, tell=tell_share), needed)
-    except Exception as error:
-        outcome = failure(error)
-    tell_share(1.0 - sum(shares))
-    return dataclasses.replace(outcome, seconds=time.perf_counter() - clock)
-
-
-# --- around the process ------------------------------------------------------------------------------------
-
-
-class TaskProcess(IsolatedProcess):
-    """A process that does one task after another, another process after one that was killed."""
-
-    def __init__(self, folder: RunFolder, assets: Assets | None) -> None:
-        super().__init__(begin_tasks, folder, assets)
-        self._warm: set[str] = set()  # code whose kernels are compiled
-
-    def do(self, task: Task, needed: Needed, told: Told = tell_nobody) -> Outcome:
-        """Return the task's outcome. What it leaves in the memo is there for the next one."""
-        clock = time.perf_counter()
-        try:
-            if not self.alive:
-                self._warm.clear()
-            if task.warm_up is not None and task.code[0] not in self._warm:
-                self.call(task.warm_up, seconds=COMPILING)
-                self._warm.add(task.code[0])
-            work = perform, task.run, needed, task.seconds
-            outcome = self.call(*work, seconds=task.deadline, told=told)
-        except Exception as error:
-            return dataclasses.replace(failure(error), seconds=time.perf_counter() - clock)
-        if outcome.status == "timeout":  # of a program, ended by its method: what it has started may run on
-            self.close()
-        return outcome
-
-    def forget(self) -> None:
-        """Empty the memo."""
-        if self.alive:
-            with suppress(WorkerDied):
-                self.call(forget, seconds=None)
-
-
 class LocalProcesses:
-    """The back end of this machine: single-threaded processes, of which `slots` are at work side by side.
+    """Single-threaded processes of this machine, of which `slots` are at work side by side.
 
-    Another back end has the same methods, see benchmarks.runner.cluster.
+    They stay for the next batch, which then loads and compiles nothing again. A cluster has the same methods.
     """
 
     def __init__(self, folder: RunFolder, assets: Assets | None, slots: int) -> None:
-        self._begin, self.slots = (folder, assets), slots
+        self._known, self.slots = (folder, assets), slots
         self._all: list[TaskProcess] = []
         self._idle: list[TaskProcess] = []
 
-    def do(self, tasks: Sequence[Task], needed: Needed, told: Told) -> Iterator[Outcome]:
+    def do(self, tasks: Sequence[Task], needed: Needed) -> Iterator[Outcome]:
         """Yield the outcome of each task of a batch, however it ends; called by several threads.
 
         One process does them. What a task leaves in the memo is there for its batch alone.
@@ -124,10 +45,10 @@ class LocalProcesses:
         if self._idle:
             process = self._idle.pop()
         else:
-            process = TaskProcess(*self._begin)
+            process = TaskProcess(*self._known)
             self._all.append(process)
         for task in tasks:
-            yield process.do(task, needed, told)
+            yield process.do(task, needed)
         process.forget()
         self._idle.append(process)
 
@@ -148,8 +69,7 @@ class LocalProcesses:
 class Executor:
     """Executes tasks whose needs are there; outcomes come in any order.
 
-    Workers stay for the next batch, which then loads and compiles nothing again; no process of them is there
-    beside a timed task.
+    Nothing is at work beside a timed task.
     """
 
     def __init__(
@@ -159,25 +79,19 @@ class Executor:
         self.back_end = cluster or LocalProcesses(folder, assets, workers)
         self._named: dict[str, TaskProcess] = {}
 
-    @property
-    def side_by_side(self) -> int:
-        """The number of untimed tasks that are expected to be at work at once."""
-        return self.back_end.slots
-
-    def together(self, ready: Callable[[], Batch | None], bar: tqdm) -> Iterator[Done]:
+    def together(self, ready: Callable[[], Batch | None]) -> Iterator[Done]:
         """Do batches of untimed tasks, some side by side, until none is at work and none is ready.
 
         ready: the next batch that can begin, None where there is none before further outcomes are known.
-        bar: is told of progress.
         """
-        events: queue.SimpleQueue[Done | float] = queue.SimpleQueue()
+        finished: queue.SimpleQueue[Done] = queue.SimpleQueue()
         stopped = threading.Event()
 
         def do(tasks: Sequence[Task], needed: Needed) -> None:
-            for outcome, task in zip(self.back_end.do(tasks, needed, events.put), tasks):
+            for outcome, task in zip(self.back_end.do(tasks, needed), tasks):
                 if stopped.is_set():  # the process was killed at it
                     return
-                events.put((task, outcome))
+                finished.put((task, outcome))
 
         at_work: set[Future[None]] = set()
         with ThreadPoolExecutor(MOST) as threads:
@@ -189,23 +103,19 @@ class Executor:
                     while len(at_work) < self.back_end.slots and (batch := ready()):
                         at_work.add(threads.submit(do, *batch))
                     try:
-                        event = events.get(timeout=POLL if at_work else 0.0)
+                        done = finished.get(timeout=POLL if at_work else 0.0)
                     except queue.Empty:
                         if not at_work:
                             break
                         continue
-                    if isinstance(event, tuple):
-                        yield event
-                    else:
-                        bar.update(min(event, bar.total - bar.n))
+                    yield done
             except BaseException as error:
                 stopped.set()
                 while at_work := {f for f in at_work if not (f.cancel() or f.done())}:
                     self.back_end.stop()
                     wait(at_work, timeout=POLL)
-                while not (events.empty() or isinstance(error, GeneratorExit)):
-                    if isinstance(event := events.get(), tuple):  # what was finished by then is kept
-                        yield event
+                while not (finished.empty() or isinstance(error, GeneratorExit)):
+                    yield finished.get()  # what was finished by then is kept
                 raise
             finally:
                 self.back_end.rest()

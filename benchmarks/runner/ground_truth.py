@@ -105,14 +105,12 @@ def simulate_clips(
     left_out: dict[str, str] = {}
     given, vertices = assets.named(motions), len(assets.garments[scene.garment].rest_positions)
     before, clips = (make_shared_clips(given, share, vertices=vertices) for share in (part, part + 1))
-    new = clips[len(before) :]
-    for clip in new:
+    for clip in clips[len(before) :]:
         positions, reason = simulated_clip(clip, scene, entry, context)
         if reason:
             left_out[clip.name] = reason
         else:
             kept[clip.name] = positions.astype(np.float32)  # as networks see it
-        context.tell(1.0 / len(new))
     path = run.clips_path(clips_of(scene.garment, motions), entry.name, part)
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as temporary:

@@ -15,38 +15,31 @@ import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
+from dataclasses import replace
 from multiprocessing import forkserver
 from multiprocessing.connection import Connection, wait
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.method import WorkerDied
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner.task import Context, Needed, Outcome, RunStopped, Task, failure
+from benchmarks.timing import give_back
 
 if TYPE_CHECKING:
     from multiprocessing.context import BaseContext
 
+    from benchmarks.assets import Assets
 
-def one_line(error: BaseException) -> str:
-    r"""Return class and message of an error in one line.
-
-    >>> one_line(ValueError("too\nlong"))
-    'ValueError: too long'
-    """
-    return " ".join(f"{type(error).__name__}: {error}".split())
-
-
-def tell_nobody(progress: float) -> None:
-    """Report progress to nobody."""
-
-
-PATIENCE = 2.0  # [s] for an idle worker to clean up behind itself
-# What every worker loads. Nothing that a scene may do without: not torch, not what a body is asked with.
+COMPILING = 900.0  # [s] for what a process does before its first task: it may have to compile every kernel
+PATIENCE = 2.0  # [s] for an idle process to clean up behind itself
+# What every process loads. Nothing that a scene may do without: not torch, not what a body is asked with.
 LOADED_BY_ALL = ("h5py", "numba", "scipy.sparse.linalg", "reference_sim", "benchmarks.runner.cells")
 # What every task of a scene with a body loads: torch skins the garment.
 LOADED_BY_DRESSED = ("benchmarks.scenes.dressed_body", "snug.networks.dressed_body")
 
 
 def start_loading(*also: str) -> BaseContext:
-    """Return the context that worker processes come from: none of them has anything of this one.
+    """Return the context that processes come from: none of them has anything of this one.
 
     On Linux a server forks them. It loads LOADED_BY_ALL and these modules once, while this process does
     something else. Elsewhere libraries may not outlive a fork, and each process loads its own.
@@ -59,46 +52,51 @@ def start_loading(*also: str) -> BaseContext:
     return context
 
 
-class IsolatedProcess:
-    """One worker process, started when first needed, and again after it had to be ended.
+class TaskProcess:
+    """A process that does one task after another, started when first needed and after one that was ended.
 
-    begin(*arguments) is called first in each new process. Call `close` at the end.
+    Call `close` at the end.
     """
 
-    def __init__(self, begin: Callable[..., None] | None = None, *arguments: Any) -> None:
-        self._begin = (begin, arguments)
+    def __init__(self, folder: RunFolder, assets: Assets | None) -> None:
+        self._known = folder, assets
         self._context: Any = start_loading()
         self._process: Any = None
 
-    @property
-    def alive(self) -> bool:
-        """True if the process that was last called is still there."""
-        return self._process is not None
+    def do(self, task: Task, needed: Needed) -> Outcome:
+        """Return the task's outcome, however it ends. What it leaves in the memo is there for the next one.
 
-    def call(
-        self,
-        function: Callable[..., Any],
-        *arguments: Any,
-        seconds: float | None,
-        told: Callable[[float], None] = tell_nobody,
-    ) -> Any:
-        """function(*arguments) in the worker; both sides must be picklable.
+        Raises RunStopped.
+        """
+        clock = time.perf_counter()
+        try:
+            outcome = self._call(warm_up, task.warm_up, seconds=COMPILING) if task.warm_up else Outcome()
+            if not outcome.failed:
+                outcome = self._call(perform, task.run, needed, seconds=task.deadline)
+        except Exception as error:
+            outcome = failure(error)
+        if outcome.status == "timeout":  # of a program, ended by its method: what it has started may run on
+            self.close()
+        return outcome if outcome.seconds else replace(outcome, seconds=time.perf_counter() - clock)
 
-        `told` is called here with what the function passes to `tell` there. Raises what the function raises,
-        and WorkerDied after `seconds` (None: no deadline) or where the process ended.
+    def forget(self) -> None:
+        """Empty the memo."""
+        if self._process is not None:
+            with suppress(WorkerDied):
+                self._call(empty_memo, seconds=None)
+
+    def _call(self, function: Callable[..., Outcome], *arguments: Any, seconds: float | None) -> Outcome:
+        """function(context, *arguments) in the process; both sides must be picklable.
+
+        Raises WorkerDied after `seconds` (None: no deadline) or where the process ended, and RunStopped.
         """
         if self._process is None:
             self._start()
-        end = None if seconds is None else time.monotonic() + seconds
         try:
             self._pipe.send((function, arguments))
-            fine = None
-            while fine is None:
-                if not self._pipe.poll(None if end is None else max(0.0, end - time.monotonic())):
-                    raise WorkerDied(f"no answer within {seconds:g} s", "timeout")
-                fine, answer = self._pipe.recv()
-                if fine is None:
-                    told(answer)
+            if not self._pipe.poll(seconds):
+                raise WorkerDied(f"no answer within {seconds:g} s", "timeout")
+            answer = self._pipe.recv()
         except (EOFError, ConnectionError):
             self._process.join()
             code = self._process.exitcode
@@ -107,26 +105,26 @@ class IsolatedProcess:
         except BaseException:
             self._kill()
             raise
-        if fine:
-            return answer
-        raise answer
+        if isinstance(answer, RunStopped):
+            raise answer
+        return answer
 
     def _start(self) -> None:
         self._pipe, far = self._context.Pipe()
-        process = self._context.Process(target=_serve, args=(far, *self._begin), daemon=True)
+        process = self._context.Process(target=_serve, args=(far, *self._known), daemon=True)
         with far:
             process.start()
         self._process = process
 
     def close(self) -> None:
-        """Let the worker end by itself, for it has nothing to do; then end all that it has started."""
+        """Let the process end by itself, for it has nothing to do; then end all that it has started."""
         if self._process is not None:
             self._pipe.close()
             self._process.join(PATIENCE)
             self._kill()
 
     def stop(self) -> None:
-        """Kill it and what it has started, from another thread: a call under way raises WorkerDied."""
+        """Kill it and what it has started, from another thread: a task under way has failed."""
         if (process := self._process) is not None:
             end_group(process.pid)
             process.kill()
@@ -159,10 +157,39 @@ def end_group(pid: int) -> None:
             os.killpg(pid, signal.SIGKILL)
 
 
+# --- in the process ----------------------------------------------------------------------------------------
+
+
+def _serve(pipe: Connection, folder: RunFolder, assets: Assets | None) -> None:
+    lead_a_group()
+    os.environ["TQDM_DISABLE"] = "1"  # one bar for all that are side by side is enough
+    context = Context(folder, assets)
+    while True:
+        try:
+            function, arguments = pipe.recv()
+        except EOFError:
+            return
+        try:
+            answer = function(context, *arguments)
+        except SystemExit:
+            raise
+        except BaseException as error:  # a user's code may raise any: interrupts are ignored here
+            answer = _failure(error)
+        sys.stderr.flush()
+        pipe.send(answer)
+
+
+def _failure(error: BaseException) -> Outcome | RunStopped:
+    try:
+        return failure(error)
+    except RunStopped as stop:
+        return stop
+
+
 def lead_a_group() -> None:
     """Make this process the leader of its group, and end both when the parent is gone.
 
-    The parent alone answers an interrupt; it ends its workers.
+    The parent alone answers an interrupt; it ends its processes.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if hasattr(os, "setpgrp"):
@@ -177,33 +204,22 @@ def lead_a_group() -> None:
     threading.Thread(target=follow, name="follow-parent", daemon=True).start()
 
 
-_pipe: Connection | None = None  # to the one who called this process
+def perform(context: Context, run: Callable[[Context, Needed], Outcome], needed: Needed) -> Outcome:
+    """Return the outcome of a task, with its time."""
+    clock = time.perf_counter()
+    outcome = run(context, needed)
+    return replace(outcome, seconds=time.perf_counter() - clock)
 
 
-def tell(seconds: float) -> None:
-    """Report, from a worker, progress in seconds that it was expected to take."""
-    if _pipe is not None:
-        _pipe.send((None, seconds))
+def warm_up(context: Context, compile_kernels: Callable[[], None]) -> Outcome:
+    """Compile what the first task would otherwise compile within its deadline."""
+    compile_kernels()
+    return Outcome()
 
 
-def _serve(pipe: Connection, begin: Callable[..., None] | None, arguments: tuple[Any, ...]) -> None:
-    global _pipe
-    _pipe = pipe
-    lead_a_group()
-    if begin is not None:
-        begin(*arguments)
-    while True:
-        try:
-            function, arguments = pipe.recv()
-        except EOFError:
-            return
-        try:
-            answer = (True, function(*arguments))
-        except SystemExit:
-            raise
-        except Exception as error:
-            answer = (False, error)
-        except BaseException as error:  # a user's code raised it: interrupts are ignored here
-            answer = (False, WorkerDied(one_line(error)))
-        sys.stderr.flush()
-        pipe.send(answer)
+def empty_memo(context: Context) -> Outcome:
+    """Empty the memo of this process and give back its memory."""
+    if context.memo:  # else there is no reason to look through all objects for garbage
+        context.memo.clear()
+        give_back()
+    return Outcome()

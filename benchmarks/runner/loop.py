@@ -64,7 +64,6 @@ class Runner:
             if self._is_ready([task]):
                 self.decide(task)
         waiting = _batches([task for task in tasks if task.id not in self.outcomes])
-        expected = sum(task.seconds for batch in waiting for task in batch)
 
         def ready() -> Batch | None:
             for batch in filter(self._is_ready, list(waiting)):
@@ -73,9 +72,11 @@ class Runner:
                     return wanted, self._needed(*wanted)
             return None
 
-        with _bar(tasks, expected, executor.side_by_side) as bar:
-            for task, outcome in executor.together(ready, bar):
+        with _bar(tasks) as bar:
+            bar.update(len(tasks) - sum(map(len, waiting)))
+            for task, outcome in executor.together(ready):
                 self._keep(task, outcome)
+                bar.update()
             bar.update(bar.total - bar.n)
 
     def _is_ready(self, batch: Sequence[Task]) -> bool:
@@ -85,13 +86,11 @@ class Runner:
 
     def _alone(self, tasks: Sequence[Task], executor: Executor) -> None:
         """Do timed tasks one by one; a process ends as soon as no other task will want it."""
-        with _bar(tasks, sum(task.seconds for task in tasks), 1) as bar:
+        with _bar(tasks) as bar:
             for place, task in enumerate(tasks):
                 if self.decide(task):
                     self._keep(task, executor.alone(task, self._needed(task)))
-                    bar.update(task.seconds)
-                else:
-                    bar.total -= task.seconds  # no time was spent on it: it says nothing of the rest
+                bar.update()
                 others = (other for other in tasks[place + 1 :] if other.process == task.process)
                 if not any(self._find(other).outcome is None for other in others):
                     executor.release(task.process)
@@ -185,19 +184,18 @@ def _titles(tasks: Sequence[Task]) -> str:
 
 
 def _batches(tasks: Sequence[Task]) -> list[list[Task]]:
-    """Return the tasks handed out together, by stage, the longest first: so workers end at about one time."""
+    """Return the tasks handed out together, by stage, the largest first: so workers end at about one time."""
     batches: dict[tuple[str, str], list[Task]] = {}
     for task in tasks:
         batches.setdefault((task.kind, task.batch or task.name), []).append(task)
     stages = list(dict.fromkeys(task.stage for task in tasks))
     return sorted(
         batches.values(),
-        key=lambda batch: (stages.index(batch[0].stage), -sum(task.seconds for task in batch)),
+        key=lambda batch: (stages.index(batch[0].stage), -sum(task.work for task in batch)),
     )
 
 
-def _bar(tasks: Sequence[Task], total: float, workers: int) -> tqdm[Never]:
+def _bar(tasks: Sequence[Task]) -> tqdm[Never]:
     from reference_sim.command_line import progress_bar
 
-    shown = "{desc}: {percentage:3.0f}%|{bar}| {elapsed}<{remaining}"
-    return progress_bar(total=total, desc=_titles(tasks), bar_format=shown, expected_rate=workers)
+    return progress_bar(total=len(tasks), desc=_titles(tasks))

@@ -17,8 +17,7 @@ from benchmarks.results.protocol import spread
 from benchmarks.results.row import STATUSES, USABLE
 from benchmarks.results.run_folder import SECONDS
 from benchmarks.runner.cells import build_scene
-from benchmarks.runner.isolated_process import one_line
-from benchmarks.runner.task import Context, Needed, Outcome
+from benchmarks.runner.task import Context, Needed, Outcome, one_line
 from reference_sim.files.atomic_files import replacing
 
 

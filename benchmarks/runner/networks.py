@@ -29,9 +29,7 @@ if TYPE_CHECKING:
 
 LONGEST = 4  # times the steps of others: at most as many has a training that is to converge
 VALIDATIONS = 25  # in the steps of others: after so many that were no better it has converged
-STEP_SECONDS = 0.03  # of SNUG's network
-PREPARATION = 25.0  # [s] expected before the first step: clips are mixed, bodies posed
-LOG_EVERY = 20  # training steps between two reports of progress
+EVERY = 20  # training steps between two rows of a model's history
 # Of a training's summary: what its guard against divergence has done, and its epochs.
 INCIDENTS = ("high_windows", "skipped_updates", "restored", "epochs")
 CHECKPOINT_MINUTES = 1.0  # between two checkpoints: what a kill loses at most
@@ -76,11 +74,9 @@ class NetworkTraining:
         return (*self.simulated.values(), *self.clips)
 
     @property
-    def seconds(self) -> float:
-        """Expected duration [s]."""
-        if self.chosen is None:
-            return 0.0
-        return PREPARATION + STEP_SECONDS * max(self.steps, 1) * KINDS[self.chosen.kind].cost
+    def work(self) -> float:
+        """Expected duration, in steps of SNUG's network."""
+        return self.steps * KINDS[self.chosen.kind].cost if self.chosen else 0.0
 
     def path(self, folder: RunFolder) -> Path:
         """Return the path of the trained model."""
@@ -122,21 +118,13 @@ def train(job: NetworkTraining, context: Context, needed: Needed) -> Outcome:
         path=path.with_name(f".{path.stem}.checkpoint.safetensors"), minutes=CHECKPOINT_MINUTES,
         resume=True, key=digest([job.key, targets]),
     )  # fmt: skip
-    reported, preparation = 0.0, PREPARATION / max(job.seconds, PREPARATION)  # shares
-
-    def log(row: dict[str, float]) -> None:
-        nonlocal reported
-        done = preparation + row["step"] / job.steps * (1.0 - preparation)
-        context.tell(done - reported)
-        reported = done
-
     if job.chosen is None:
         model = untrained_model("snug", dressed, assets.named(motions), seed=job.seed)
     else:
         model = train_network(
             job.chosen.kind, dressed, [*assets.named(motions), *mixed], steps=job.steps,
-            seed=job.seed, trajectories=targets, recipe=job.chosen.recipe, log=log, progress=False,
-            every=LOG_EVERY, device=job.device, checkpoint=checkpoint, validation=validation,
+            seed=job.seed, trajectories=targets, recipe=job.chosen.recipe, progress=False,
+            every=EVERY, device=job.device, checkpoint=checkpoint, validation=validation,
         )  # fmt: skip
     model.origin = origin_of(job, needed, left_out=[name for name in job.motions if name not in motions])
     path.parent.mkdir(parents=True, exist_ok=True)

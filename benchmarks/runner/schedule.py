@@ -49,29 +49,25 @@ from benchmarks.runner.task import Outcome, Task
 from benchmarks.scene import Scene
 from benchmarks.scenes import find_scene, of_garment
 from benchmarks.training import Simulated
-from snug.motion.library import CLIPS
 
 if TYPE_CHECKING:
     from benchmarks.validation.case import Case
 
-SIMULATOR = "reference_sim"
-DRESSING = ("snug/data", "snug/body", "snug/motion", "snug/garments", "benchmarks/assets.py")
-# What mixes clips from motions, to be simulated.
-MIXING = ("snug/training/augmentation.py", "snug/recipe.py", "snug/named_recipes.py")
-NETWORKS = ("snug", "benchmarks/assets.py")
-SCENES = ("benchmarks/scene.py", "benchmarks/scenes", "benchmarks/meshes.py")
-RUNS = (
-    SIMULATOR, *SCENES, "benchmarks/external", "benchmarks/method.py", "benchmarks/timing.py",
+# Code that an outcome depends on: whatever of it changes makes the outcome stale. A run also depends on the
+# modules of its method and its scene, see code_behind.
+RUNNING = (
+    "reference_sim", "snug", "benchmarks/assets.py", "benchmarks/scene.py", "benchmarks/scenes",
+    "benchmarks/meshes.py", "benchmarks/external", "benchmarks/method.py",
+    "benchmarks/methods/simulation.py", "benchmarks/methods/sweeps.py", "benchmarks/timing.py",
     "benchmarks/runner/isolated_process.py", "benchmarks/runner/cells.py",
+    "benchmarks/runner/ground_truth.py", "benchmarks/runner/networks.py",
 )  # fmt: skip
-SOLVERS = ("benchmarks/methods/simulation.py", "benchmarks/methods/sweeps.py")
-METRICS = (
-    "benchmarks/metrics", "benchmarks/metric.py", "benchmarks/results", "benchmarks/runner/measurements.py",
-    "snug",
+MEASURING = (
+    *RUNNING, "benchmarks/metrics", "benchmarks/metric.py", "benchmarks/results",
+    "benchmarks/runner/measurements.py",
 )  # fmt: skip
-CASES = ("benchmarks/validation", "benchmarks/assets.py", *SOLVERS, *METRICS, *RUNS)
-TRAINING = ("benchmarks/runner/networks.py", SIMULATOR, *NETWORKS)
-USERS_OWN = ("benchmarks/methods", *METRICS, *RUNS)  # what a user's file may import
+CASES = (*MEASURING, "benchmarks/validation")
+USERS_OWN = (*MEASURING, "benchmarks/methods")  # what a user's file may import
 
 
 def declared(entry: MethodEntry | Scene | Case) -> dict[str, Any]:
@@ -85,15 +81,12 @@ def declared(entry: MethodEntry | Scene | Case) -> dict[str, Any]:
 
 
 def code_behind(entry: MethodEntry | Scene) -> tuple[str, ...]:
-    """Return the code of a scene or a method: the file of its module, and what files of a user depend on.
+    """Return the file of the module of a scene or a method, and what files of a user depend on.
 
     Raises DeclarationError where its module is missing.
     """
     file = find_module(entry.module)
-    code = users_code(file, entry.declared_in) or (file,)
-    if isinstance(entry, MethodEntry):
-        code = (*code, *SOLVERS, *(NETWORKS if entry.needs_body or entry.trained else ()))
-    return code
+    return users_code(file, entry.declared_in) or (file,)
 
 
 def users_code(*homes: str) -> tuple[str, ...]:
@@ -102,12 +95,8 @@ def users_code(*homes: str) -> tuple[str, ...]:
     return (*own, *USERS_OWN) if own else ()
 
 
-FRAME = 0.07  # [s] expected of a simulated frame
-SIMULATION = 7.0  # [s] expected of a cell's simulation to convergence
-SHORT = 0.05  # of these, for a network or a simulation that is stopped early
 TRAINED = "training"  # the stage of networks that no file has
 AT_ONCE = 8  # cells of one scene whose processes wait for their repeats: each holds some hundred megabytes
-TRUTH = "benchmarks/runner/ground_truth.py"
 
 
 def tasks_of(plan: Plan) -> list[Task]:
@@ -150,9 +139,7 @@ class Schedule:
         return Task(
             kind="start", name=flat(scene.name), label=scene.name, stage="ground truth", silent=True,
             run=partial(settle_start, scene), files=files_of_start(scene, self.folder),
-            needs=(start_of(self._settled_in(scene)),) if scene.start_of else (),
-            seconds=FRAME * self.preset.settle_frames,
-            **self._of_scene(scene, TRUTH),
+            needs=(start_of(self._settled_in(scene)),) if scene.start_of else (), **self._of_scene(scene),
         )  # fmt: skip
 
     def ground_truth(self, network: Network) -> list[Task]:
@@ -172,7 +159,6 @@ class Schedule:
         return Task(
             kind="data", name=f"{flat(scene.name)}/{flat(entry.name)}", label=_label(scene.name, entry),
             stage="ground truth", silent=True, run=partial(simulate_motion, scene, entry),
-            seconds=FRAME * (self.preset.settle_frames + self._frames(motion)),
             **self._simulated_by(entry, scene),
         )  # fmt: skip
 
@@ -187,9 +173,8 @@ class Schedule:
             kind="clips", name=f"{flat(clips)}/{flat(entry.name)}-{part}",
             label=_label(f"{garment}, mixed clips of {len(motions)} motions, part {part}", entry),
             stage="ground truth", silent=True, run=partial(simulate_clips, scene, entry, motions, part),
-            seconds=FRAME * sum(map(self._frames, motions)),
             inputs=of_scene["inputs"] | {"part": part, "motions": mixed_of},
-            code=(*of_scene["code"], *MIXING),
+            code=of_scene["code"],
         )  # fmt: skip
 
     def network(self, network: Network) -> Task:
@@ -208,11 +193,11 @@ class Schedule:
                 return Task(
                     stage="pretrained networks", run=partial(take, job, source or Path()), skip=refusal,
                     inputs={"file": digest_of_file(source) if source else ""},
-                    code=("benchmarks/runner/networks.py", "snug/networks"), **fields,
+                    code=RUNNING, **fields,
                 )  # fmt: skip
         return Task(
-            stage=TRAINED, run=partial(train, job), reads=job.reads, seconds=job.seconds,
-            inputs=self._inputs_of(network), code=(*TRAINING, *users_code(network.declared_in)), **fields,
+            stage=TRAINED, run=partial(train, job), reads=job.reads, work=job.work,
+            inputs=self._inputs_of(network), code=(*RUNNING, *users_code(network.declared_in)), **fields,
         )  # fmt: skip
 
     def training(self, network: Network) -> NetworkTraining:
@@ -221,7 +206,7 @@ class Schedule:
         truth = self.ground_truth(network)
         ids = [task.id for task in truth if task.kind == "data"]
         inputs = digests_of(self._inputs_of(network))
-        code = software(*TRAINING, *users_code(network.declared_in))
+        code = software(*RUNNING, *users_code(network.declared_in))
         return NetworkTraining(
             training=network.name, chosen=network.training, home=network.declared_in, seed=network.seed,
             garment=network.garment, steps=self._steps(network), motions=motions, held_out=held_out,
@@ -264,7 +249,7 @@ class Schedule:
             turn = number * len(repeated) // self.preset.repeats
             for cell in (*repeated[turn:], *repeated[:turn]):
                 yield self._timed(
-                    cell, cell.repeat_id(number), repeat_cell, seconds=0.5,
+                    cell, cell.repeat_id(number), repeat_cell,
                     skip=partial(too_long, self.preset.repeat_seconds),
                 )  # fmt: skip
 
@@ -288,14 +273,13 @@ class Schedule:
         return Task(
             kind="cell", name=cell.name, label=cell.label, stage="cells that are not timed",
             run=partial(run_cell, cell, self._least(cell)), batch=cell.scene.name,
-            seconds=SIMULATION * (SHORT if entry.trained or entry.truncated else 1.0),
             deadline=self.preset.cell_seconds, **fields,
         )  # fmt: skip
 
     def _timed(self, cell: Cell, id: TaskId, run: Callable[..., Outcome], **fields: Any) -> Task:
         """Return the run of a timed cell, or a task that follows it in its process."""
         least = self._least(cell)
-        usual = {"inputs": {"least": least}, "code": RUNS, "needs": (cell.task_id,), "seconds": 2.0}
+        usual = {"inputs": {"least": least}, "code": RUNNING, "needs": (cell.task_id,)}
         more: dict[str, Any] = usual | fields
         return Task(
             kind=id[0], name=id[1], label=cell.label, stage="cells", run=partial(run, cell, least),
@@ -314,8 +298,7 @@ class Schedule:
         return Task(
             kind="quasi-static", name=flat(scene.name), label=scene.name, stage="quasi-static answers",
             silent=True, run=partial(simulate_quasi_static, scene), needs=(start_of(scene),),
-            seconds=FRAME * self._frames(scene.motion),
-            **self._of_scene(scene, TRUTH),
+            **self._of_scene(scene),
         )  # fmt: skip
 
     def metrics(self, cell: Cell) -> Task:
@@ -335,9 +318,7 @@ class Schedule:
             same = (c for c in plan.cells if (c.scene.name, c.method, c.seed) == wanted)
             if (counterpart := next(same, None)) is not None:
                 reads = (*reads, counterpart.task_id)
-        of_scene = self._of_scene(
-            scene, "benchmarks/runner/measurements.py", *METRICS, *users_code(*plan.metrics)
-        )
+        of_scene = self._of_scene(scene, *MEASURING, *users_code(*plan.metrics))
         inputs = {
             "suites": sorted(cell.suites),
             "samples": self.preset.gap_samples,
@@ -351,13 +332,10 @@ class Schedule:
             cell=cell, cells=cells, gap_samples=self.preset.gap_samples, quasi_static=quasi_static,
             counterpart=counterpart, outside=plan.metrics,
         )  # fmt: skip
-        # The first of a batch measures the body, the reference, and how all of them touch the body.
-        share = 7 + 2 * len(cells) // 5 if cells[:1] == (cell,) else 1
         return Task(
             kind="metrics", name=cell.name, label=cell.label, stage="metrics",
             run=partial(measure_cell, work), needs=(cell.task_id,), reads=reads, batch=scene.name,
             files=(self.folder.relative(self.folder.curves_path(*cell.key)),),
-            seconds=0.01 * self._frames(scene.motion) * share,
             inputs=of_scene["inputs"] | inputs, code=of_scene["code"],
         )  # fmt: skip
 
@@ -365,7 +343,7 @@ class Schedule:
         """Return the task of a known answer or a stress test."""
         return Task(
             kind="case", name=case.name, label=case.name, stage="validation", run=partial(run_case, case),
-            warm_up=case.warm_up, deadline=case.seconds, process=case.process, seconds=0.2,
+            warm_up=case.warm_up, deadline=case.seconds, process=case.process,
             inputs=self._machine() | {"declared": declared(case)},
             code=(find_module(case.module), *CASES),
         )  # fmt: skip
@@ -387,7 +365,7 @@ class Schedule:
         declaration = declared(scene) | {"timed": scene.timed, "dynamic": scene.dynamic}
         del declaration["metrics"], declaration["counterpart"]
         inputs = self._machine() | {"scene": declaration}
-        code = (*code, *RUNS, *code_behind(scene))
+        code = (*code, *RUNNING, *code_behind(scene))
         if not scene.dressed:
             return {"inputs": inputs, "code": code}
         inputs |= self._of_body(scene.garment) | {"motion": self._motion(scene.motion)}
@@ -395,7 +373,7 @@ class Schedule:
             inputs["frames"] = self.preset.frames
         if scene.part == "clip":
             inputs["clip_frames"] = self.preset.clip_frames
-        return {"inputs": inputs, "code": (*code, *DRESSING)}
+        return {"inputs": inputs, "code": code}
 
     def _of_body(self, garment: str) -> dict[str, Any]:
         """Return the inputs that the assets are made from."""
@@ -418,16 +396,10 @@ class Schedule:
 
     def _simulated_by(self, entry: MethodEntry, scene: Scene) -> dict[str, Any]:
         """Return inputs and code of a task that simulates a scene by a method, to learn from."""
-        of_scene = self._of_scene(scene, TRUTH, *code_behind(entry))
+        of_scene = self._of_scene(scene, *code_behind(entry))
         return of_scene | {"inputs": of_scene["inputs"] | {"method": declared(entry)}}
 
     # --- facts of the plan ---------------------------------------------------------------------------------
-
-    def _frames(self, motion: str) -> int:
-        """Return the frames of a motion, as far as progress goes: those made by code have some hundred."""
-        files, train = self.plan.inputs.motions, self.plan.motions.train
-        frames = files[motion].frames if motion in files else CLIPS[motion].frames if motion in CLIPS else 100
-        return min(self.preset.train_frames if motion in train else self.preset.frames, frames)
 
     def _learned(self, network: Network) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Return the motions that a network trains on, and those that stop its training."""

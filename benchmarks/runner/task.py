@@ -10,8 +10,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
+from benchmarks.method import WorkerDied
 from benchmarks.plan.cell import TaskId
-from benchmarks.runner.isolated_process import WorkerDied, one_line, tell_nobody
 
 if TYPE_CHECKING:
     from benchmarks.assets import Assets
@@ -60,13 +60,11 @@ class Context:
     Attributes:
         folder: files of the run.
         assets: body, garments and motions; None where no task needs a dressed body.
-        tell: reports a further share of the task that is done; by default to nobody.
         memo: kept between the tasks of one batch in this process.
     """
 
     folder: RunFolder
     assets: Assets | None = None
-    tell: Callable[[float], None] = tell_nobody
     memo: dict[Any, Any] = field(default_factory=dict)
 
 
@@ -90,12 +88,12 @@ class Task:
         skip: why there is nothing to do, or empty, or how to tell it from what it needs. Such a task leaves
             no trace.
         files: names of the files that it may leave, removed before it is run again.
-        seconds: its expected duration [s], for the progress bar and the order of tasks.
+        work: how much it is, compared with others of its stage: the largest begin first.
         batch: tasks of one batch are handed out together.
         process: a timed task runs alone on the machine, in the process of this name; others, without a
             name, run side by side in any process.
         motion: of the assets, all that the process of a timed task needs; empty: it needs no assets.
-        warm_up: prepares a process for its first task of this code; the deadline does not count.
+        warm_up: compiles kernels in its process beforehand; the deadline does not count.
         deadline: [s] after which its process is ended.
         silent: whether no row of the results speaks of it: a failure is then said apart.
     """
@@ -111,7 +109,7 @@ class Task:
     reads: tuple[TaskId, ...] = ()
     skip: str | Callable[[Needed], str] = ""
     files: tuple[str, ...] = ()
-    seconds: float = 1.0
+    work: float = 1.0
     batch: str = ""
     process: str = ""
     motion: str = ""
@@ -139,6 +137,15 @@ class RunStopped(RuntimeError):
 
     The message says why.
     """
+
+
+def one_line(error: BaseException) -> str:
+    r"""Return class and message of an error in one line.
+
+    >>> one_line(ValueError("too\nlong"))
+    'ValueError: too long'
+    """
+    return " ".join(f"{type(error).__name__}: {error}".split())
 
 
 def failure(error: BaseException) -> Outcome:

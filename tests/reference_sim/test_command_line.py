@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import errno
 import importlib
-import io
 
 import pytest
 
-from reference_sim.command_line import announce_compilation, command, progress_bar
+from reference_sim.command_line import announce_compilation, command
 
 
 @pytest.mark.parametrize(
@@ -57,21 +56,6 @@ def test_a_fault_of_the_program_is_raised():
 
     with pytest.raises(ValueError, match="shapes"):
         main()
-
-
-def _time_left(*, done, seconds, expected_rate):
-    bar = progress_bar(total=3600.0, file=io.StringIO(), expected_rate=expected_rate)
-    bar.update(done)
-    bar.start_t -= seconds
-    shown = bar.format_dict
-    bar.close()
-    return (shown["total"] - shown["n"]) / shown["rate"]
-
-
-def test_time_left_is_known_before_a_task_has_ended_and_follows_what_is_measured_in_the_end():
-    assert abs(_time_left(done=0.0, seconds=0.0, expected_rate=2.0) - 1800.0) < 1.0
-    measured = 1800.0 / 0.5  # half of the work in an hour: twice as slow as expected of one worker
-    assert 0.9 * measured < _time_left(done=1800.0, seconds=3600.0, expected_rate=1.0) < measured
 
 
 def test_compilation_is_announced_where_no_compiled_kernel_lies_on_disk(tmp_path, monkeypatch, capsys):

@@ -23,7 +23,6 @@ from benchmarks.runner.cluster import Cluster
 from benchmarks.runner.executor import Executor
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.task import Context, Outcome, Task
-from tests.benchmarks.runner.tasks_by_hand import Bar
 
 ROOT = Path(__file__).resolve().parents[3]
 PATH = str(ROOT)
@@ -158,7 +157,7 @@ def finish(folder: Path, address: str = "", **fields) -> Runner:
 def together(folder: RunFolder, address: str, *batches) -> dict[str, Outcome]:
     left, cluster = [(batch, {}) for batch in reversed(batches)], executor(folder, address)
     try:
-        outcomes = cluster.together(lambda: left.pop() if left else None, Bar())
+        outcomes = cluster.together(lambda: left.pop() if left else None)
         return {task.name: outcome for task, outcome in outcomes}
     finally:
         cluster.close()

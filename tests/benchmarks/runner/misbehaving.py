@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.method import Method
+from benchmarks.runner.task import Outcome
 from reference_sim.trajectory import Trajectory
 
 # No other test starts a process by this text, so that the test which looks for it finds its own alone.
@@ -100,3 +101,8 @@ class Misbehaving(Method):
 
 def make(*, models: Path, seed: int, how: str) -> Misbehaving:
     return Misbehaving(how)
+
+
+def loaded_modules(context, needed) -> Outcome:
+    """A task that tells what its process has loaded."""
+    return Outcome(result={"names": set(sys.modules)})

@@ -113,19 +113,8 @@ def grouped(scene: BuiltScene, positions: dict[str, np.ndarray], **fields) -> Sc
     return group
 
 
-class Bar:
-    """A progress bar that counts the units of which it is told."""
-
-    total, n = 100, 0
-
-    def update(self, units=1):
-        self.n += units
-
-
 class InProcess:
     """An executor that does everything here: the seam behind which a cluster could stand."""
-
-    side_by_side = 1
 
     def __init__(self, folder: RunFolder, assets: Assets | None = None) -> None:
         self.folder, self.assets = folder, assets
@@ -134,7 +123,7 @@ class InProcess:
     def context(self) -> Context:
         return Context(self.folder, self.assets)
 
-    def together(self, ready, bar):
+    def together(self, ready):
         while batch := ready():
             tasks, needed = batch
             context = self.context()

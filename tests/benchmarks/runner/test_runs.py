@@ -165,14 +165,17 @@ def test_a_failed_task_that_no_row_speaks_of_makes_the_exit_status_1(tmp_path, m
 
 
 HANGING = """
-import sys, time
+import sys
 from pathlib import Path
 from benchmarks.runner.execute_plan import held
-from benchmarks.runner.isolated_process import IsolatedProcess
+from benchmarks.results.run_folder import RunFolder
+from benchmarks.runner.isolated_process import TaskProcess
+from tests.benchmarks.runner.test_tasks import task
 with held(Path(sys.argv[1])):
-    process = IsolatedProcess()
-    process.call(print, "begun", seconds=60)
-    process.call(time.sleep, 60, seconds=60)
+    process = TaskProcess(RunFolder(Path(sys.argv[1])), None)
+    process.do(task("first"), {})
+    print("begun")
+    process.do(task("hangs", "pause"), {})
 """
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import os
 import signal
 import sys
@@ -19,7 +20,8 @@ from benchmarks.runner.loop import Runner, _batches
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.runner.task import Context, Outcome, RunStopped, Task, failure
 from tests.benchmarks.plan.planned import planned
-from tests.benchmarks.runner.tasks_by_hand import Bar, InProcess
+from tests.benchmarks.runner.misbehaving import loaded_modules
+from tests.benchmarks.runner.tasks_by_hand import InProcess
 from tests.project.own_memory import needs_proc, own_memory
 
 HELD: list[bytearray] = []  # of a process
@@ -33,7 +35,7 @@ def fail(how: str) -> None:
         os.kill(os.getpid(), signal.SIGKILL)
     if how == "exit":
         os._exit(7)
-    if how == "hang":
+    if how in ("hang", "pause"):
         signal.pause()
     if how == "interrupt":
         raise KeyboardInterrupt
@@ -48,7 +50,6 @@ def fail(how: str) -> None:
 def write(name: str, how: str, context: Context, needed) -> Outcome:
     """Write a file of the words of what is needed, unless `how` says what to do instead."""
     fail(how)
-    context.tell(0.5)
     context.memo.setdefault("done", []).append(name)
     path = context.folder.path / f"{name}.txt"
     path.write_text("".join(outcome.result["word"] for outcome in needed.values()) or "first")
@@ -179,13 +180,11 @@ def test_what_is_damaged_is_done_again_alone_where_it_comes_back_as_it_was(tmp_p
 class TwoAtOnce(InProcess):
     """Two workers, of which the one that began first ends first; writes down what is at work at a time."""
 
-    side_by_side = 2
-
     def __init__(self, folder: RunFolder) -> None:
         super().__init__(folder)
         self.at_work: list[list[str]] = []
 
-    def together(self, ready, bar):
+    def together(self, ready):
         begun = []
         while True:
             while len(begun) < 2 and (batch := ready()):
@@ -204,7 +203,7 @@ class TwoAtOnce(InProcess):
 
 def test_a_task_begins_when_its_needs_are_there_and_nothing_is_beside_a_timed_task(tmp_path):
     tasks = (
-        task("short"), task("long", seconds=5.0), task("next", needs=ids("short", "long")),
+        task("short"), task("long", work=5.0), task("next", needs=ids("short", "long")),
         task("timed", needs=ids("next"), process="own"),
         task("after", needs=ids("timed")), task("one", needs=ids("short"), batch="both"),
         task("two", needs=ids("long"), batch="both"), task("three", needs=ids("next")),
@@ -228,28 +227,27 @@ def test_the_longest_training_begins_first(tmp_path):
 # --- processes ---------------------------------------------------------------------------------------------
 
 
-def together(folder: Path, *batches: list[Task]) -> tuple[dict[str, Outcome], Bar]:
-    left, bar = [(batch, {}) for batch in reversed(batches)], Bar()
-    done = Executor(RunFolder(folder), None, 1).together(lambda: left.pop() if left else None, bar)
-    return {task.name: outcome for task, outcome in done}, bar
+def together(folder: Path, *batches: list[Task]) -> dict[str, Outcome]:
+    left = [(batch, {}) for batch in reversed(batches)]
+    done = Executor(RunFolder(folder), None, 1).together(lambda: left.pop() if left else None)
+    return {task.name: outcome for task, outcome in done}
 
 
 def test_a_batch_stays_together_and_nothing_is_kept_between_batches(tmp_path):
     batch = [task("one"), task("two"), task("bad", "raise"), task("four")]
-    outcomes, bar = together(tmp_path, batch, [task("three")])
+    outcomes = together(tmp_path, batch, [task("three")])
     memos = {name: outcome.result.get("memo") for name, outcome in outcomes.items()}
     assert memos == {
         "one": ["one"], "two": ["one", "two"], "bad": None, "four": ["one", "two", "four"],
         "three": ["three"],
     }  # fmt: skip
-    assert bar.n == pytest.approx(5.0)  # seconds that were expected
 
 
 def test_what_was_finished_is_kept_where_the_run_stops(tmp_path):
     batches = [([task("one"), task("stops", "stop"), task("after")], {})]
     executor, kept = Executor(RunFolder(tmp_path), None, 1), []
     with pytest.raises(RunStopped, match="the disk is full"):
-        for done, _ in executor.together(lambda: batches.pop() if batches else None, Bar()):
+        for done, _ in executor.together(lambda: batches.pop() if batches else None):
             kept.append(done.name)
     assert kept == ["one"]
 
@@ -257,7 +255,7 @@ def test_what_was_finished_is_kept_where_the_run_stops(tmp_path):
 @pytest.mark.slow
 @needs_proc
 def test_free_memory_of_a_batch_is_given_back(tmp_path):
-    outcomes, _ = together(tmp_path, [task("one", "fill"), task("two")], [task("three")])
+    outcomes = together(tmp_path, [task("one", "fill"), task("two")], [task("three")])
     during, after = (outcomes[name].result["kB"] for name in ("two", "three"))
     assert during - after > 100_000
 
@@ -283,7 +281,7 @@ def test_a_process_that_cannot_start_is_a_failure_each_time(tmp_path):
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere each process loads its own")
 def test_a_process_begins_with_what_all_need_and_nothing_that_a_scene_may_do_without(tmp_path):
     process = TaskProcess(RunFolder(tmp_path), None)
-    there = {name for name in process.call(eval, "[*__import__('sys').modules]", seconds=60)}
+    there = process.do(dataclasses.replace(task("one"), run=loaded_modules), {}).result["names"]
     process.close()
     assert there.issuperset({"h5py", "numba", "scipy", *LOADED_BY_ALL})
     assert not [name for name in there if name.startswith(("snug", "torch", "igl"))]
