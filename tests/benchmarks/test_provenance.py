@@ -34,9 +34,14 @@ NOT_BESIDE = {"other/place/module.py": "", "mine.txt": "", ".hidden/a.py": "", "
 
 
 def write(root: Path, path: str, text: str) -> None:
-    """Write a file anew, and let nothing be known of files that were read."""
+    """Write a file anew."""
     (root / path).parent.mkdir(parents=True, exist_ok=True)
     (root / path).write_text(text)
+    forget()
+
+
+def forget() -> None:
+    """Let nothing be known of files that were read."""
     provenance._content.cache_clear()
 
 
