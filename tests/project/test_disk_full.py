@@ -10,7 +10,6 @@ import os
 import resource
 from collections.abc import Iterator
 from contextlib import contextmanager
-from pathlib import Path
 
 import pytest
 import torch
@@ -19,7 +18,7 @@ from benchmarks import run
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution
 from benchmarks.runner.isolated_process import start_loading
-from reference_sim.files.atomic_files import disk_full, replacing
+from reference_sim.files.atomic_files import disk_full
 from snug.networks.tensor_file import read_tensors, write_tensors
 from snug.training import checkpoint as checkpoints
 from snug.training.checkpoint import Checkpoint
@@ -43,15 +42,9 @@ def files_up_to(size: int) -> Iterator[None]:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
-def save_bytes(path: Path) -> None:
-    with replacing(path) as temporary:
-        temporary.write_bytes(bytes(8000))
-
-
 @pytest.mark.parametrize(
     "write",
     [
-        save_bytes,
         lambda path: write_tensors(path, {"a": torch.ones(10_000)}, {"format": "x"}),
         lambda path: wave(400).save(path),
     ],

@@ -23,10 +23,6 @@ def test_the_examples_of_a_module_give_what_they_say(module):
     assert doctest.testmod(loaded).failed == 0
 
 
-def test_every_layer_has_examples():
-    assert {module.partition(".")[0] for module in EXAMPLES} == set(LAYERS)
-
-
 @pytest.mark.parametrize("face", FACES)
 def test_a_face_gives_what_it_names_and_its_functions_have_examples(face):
     package = importlib.import_module(face)

@@ -7,8 +7,7 @@ import math
 import pytest
 
 from benchmarks.validation.case import Case, cases_of, known_answer
-from benchmarks.validation.equilibrium import fitted_order
-from benchmarks.validation.registry import CASES, KNOWN_ANSWERS
+from benchmarks.validation.registry import KNOWN_ANSWERS
 from tests.benchmarks.plan.planned import planned
 
 
@@ -23,12 +22,6 @@ def test_a_known_answer_is_found(case):
     row = case.run()
     assert row.status == "ok", row.reason
     assert (row.suite, row.scene, row.method, row.metric) == ("validation", case.name, "simulation", "check")
-
-
-def test_every_case_has_a_name_of_its_own_and_a_reason():
-    names = [case.name for case in CASES]
-    assert len(set(names)) == len(set(CASES)) == len(names)
-    assert all(case.reason for case in KNOWN_ANSWERS)
 
 
 def test_study_smoke_runs_the_quick_ones_unless_one_is_named():
@@ -48,9 +41,7 @@ def given(number: object) -> object:
     [
         (1.0, 1.0, 0.0, "ok"),
         (1.2, 1.0, 0.1, "failed"),
-        ((1.2, 1.15), None, 0.1, "ok"),
         ((1.2, 1.0), None, 0.1, "failed"),
-        (7.0, None, None, "ok"),
         (7.0, 3.0, None, "ok"),
         (7.0, None, 0.1, "failed"),
         (math.nan, None, None, "failed"),
@@ -63,33 +54,22 @@ def test_how_a_number_is_judged(number, expected, tolerance, status):
         options={"number": number}, expected=expected, tolerance=tolerance,
     )  # fmt: skip
     row = case.run()
-    assert row.status == status and (status == "ok" or row.reason)
-    assert row.tolerance == tolerance
-    if isinstance(number, tuple):
-        assert (row.value, row.expected) == number
+    assert row.status == status and (status == "ok" or row.reason) and row.tolerance == tolerance
 
 
 @known_answer(["planted_sum", "planted_exact"], tolerance=0.5, reason="planted")
 @known_answer({"planted_option": {"sign": -1.0}}, smoke=False, expected=3.0, reason="planted")
 def two_at_once(sign: float = 1.0) -> dict[str, object]:
-    """Return the planted numbers of several cases.
-
-    Not described by this.
-    """
+    """Return the planted numbers of several cases."""
     return {"planted_sum": (sign, 1.2), "planted_exact": 2.0, "planted_option": 2.0 + sign}
 
 
 def test_a_declaration_stands_on_its_function():
-    cases = {case.name: case for case in cases_of(__name__)}
-    assert list(cases) == ["planted_option", "planted_sum", "planted_exact"]
-    assert [case.smoke for case in cases.values()] == [False, True, True]
-    assert cases["planted_sum"].description == "planted numbers of several cases"
-    assert cases["planted_option"].description == "planted numbers of several cases: sign = -1.0"
-    rows = {name: case.run() for name, case in cases.items()}
-    found = {name: (row.value, row.expected, row.status) for name, row in rows.items()}
-    assert found["planted_sum"] == (1.0, 1.2, "ok") and found["planted_option"] == (1.0, 3.0, "ok")
-    assert found["planted_exact"] == (2.0, None, "failed")  # a tolerance, but nothing to compare with
-
-
-def test_an_order_of_errors_that_are_zero_or_not_finite_is_none():
-    assert all(math.isnan(fitted_order([1.0, error], [1, 0.5])) for error in (0.0, math.inf))
+    option, total, _ = cases = cases_of(__name__)
+    assert [case.name for case in cases] == ["planted_option", "planted_sum", "planted_exact"]
+    assert [case.smoke for case in cases] == [False, True, True]
+    assert total.description == "planted numbers of several cases"
+    assert option.description == "planted numbers of several cases: sign = -1.0"
+    rows = [(row.value, row.expected, row.status) for row in (case.run() for case in cases)]
+    assert rows[:2] == [(1.0, 3.0, "ok"), (1.0, 1.2, "ok")]
+    assert rows[2] == (2.0, None, "failed")  # a tolerance, but nothing to compare with
