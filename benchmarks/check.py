@@ -52,7 +52,6 @@ exit status: 0 when nothing is wrong; 1 when something is, a line for each; 2 wh
 # Pins that move, an obstacle, and a dressed body.
 SCENES_OF_METHODS = ("flag", "sheet_on_sphere", "{garment}/kick")
 SCENE_OF_METRICS = "hanging_sheet"
-KINDS = ("start", "data", "clips", "network", "cell", "batch")  # of tasks that tell of methods and scenes
 SIZES = replace(
     find_preset("smoke"), garment_vertices=300, frames=8, clip_frames=8, warm_up_frames=2, settle_frames=4,
     sheet_cells=4, sheet_frames=6, cell_seconds=120.0, least_seconds=0.02, repeats=1,
@@ -136,26 +135,17 @@ def faults_of(plan: Plan) -> Iterator[tuple[str, str]]:
             yield cell.method, f"is skipped in every scene: {skipped[cell]}"
     if not cells:
         return
-    plan = replace(plan, cells=cells)
-    names = {cell: name_of(cell) for cell in cells}
-    wanted = {cell.metrics_id for cell in cells if not names[cell]}
-    tasks = [checked(task) for task in tasks_of(plan) if task.kind in KINDS or task.id in wanted]
     run = RunFolder(plan.folder)
-    runner = Runner(tasks, Cache(run))
+    runner = Runner([checked(task) for task in tasks_of(replace(plan, cells=cells))], Cache(run))
     runner.run(Executor(run, plan.open_assets() if plan.garments else None, plan.workers))
-    for cell, name in names.items():
-        ids = (cell.task_id, cell.batch_id if name else cell.metrics_id)
+    for cell in cells:
+        ids = (cell.task_id, cell.batch_id, cell.metrics_id)
         outcomes = [runner.outcomes.get(id, Outcome()) for id in ids]
         reasons = (o.reason for o in outcomes if o.failed or o.status == "failed")
         fault = next(reasons, "").removeprefix(f"{ContractError.__name__}: ")
-        yield name or f"{plan.metrics[0]} in {cell.scene.name}", fault
-
-
-def name_of(cell: Cell) -> str:
-    """Return the name of what a user has declared of a cell; empty where it is measured alone."""
-    if cell.entry.declared_in:
-        return f"{cell.method} in {cell.scene.name}"
-    return cell.scene.name if cell.scene.declared_in else ""
+        own_scene = cell.scene.declared_in and not cell.entry.declared_in
+        what = cell.method if cell.entry.declared_in else "".join(plan.metrics)
+        yield cell.scene.name if own_scene else f"{what} in {cell.scene.name}", fault
 
 
 # --- tasks that check what they run ------------------------------------------------------------------------

@@ -17,7 +17,7 @@ from pathlib import Path
 from benchmarks.external.roll_out_files import RollOutOption
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.plan import Plan
-from benchmarks.plan.study import StudyError, read_fields, read_study
+from benchmarks.plan.study import read_fields, read_study
 from benchmarks.presets import find_preset
 from benchmarks.provenance import digest_of_file
 from benchmarks.results.protocol import DIGEST, NUMBER
@@ -82,7 +82,7 @@ class Metadata:
     scenes: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
-        """Raise StudyError for the first field that cannot be meant."""
+        """Raise ValueError for the first field that cannot be meant."""
         given = "roll_outs" if self.roll_outs else "program"
         path = Path(getattr(self, given))
         demands = (
@@ -97,7 +97,7 @@ class Metadata:
         )  # fmt: skip
         for name, fine, otherwise in demands:
             if not fine:
-                raise StudyError(f"{getattr(self, name)!r}: {otherwise}", (name,))
+                raise ValueError(f"{name} = {getattr(self, name)!r}: {otherwise}")
 
 
 @dataclass(frozen=True)
@@ -189,7 +189,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def read_entry(path: Path) -> Entry:
-    """Read the metadata of an entry. Raises StudyError with file, line and field."""
+    """Read the metadata of an entry. Raises StudyError with file and field."""
     return Entry(path, read_fields(Metadata, path / METADATA))
 
 

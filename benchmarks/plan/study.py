@@ -318,7 +318,8 @@ class _Reader:
     def place(self, field: Field) -> str:
         """Return where a field was said."""
         layer = self.layer(field)
-        return layer.label if layer.folder is None else f"{layer.label}: {'.'.join(field)}"
+        words = [] if layer.folder is None else [".".join(field)]
+        return ": ".join(filter(None, [layer.label, *words]))
 
     def path(self, field: Field, name: str) -> Path:
         """Return a path; those of a file are relative to its folder."""
