@@ -97,7 +97,7 @@ def test_a_file_that_is_not_as_it_was_scored_is_refused(copy, name, refused):
         (
             f'protocol = "{NUMBER}"',
             'protocol = "0.9"',
-            f"entry.toml: protocol = '0.9': this is protocol {NUMBER}",
+            f"protocol = '0.9': this is protocol {NUMBER}",
         ),
         ('title = "Waving"\n', "", "missing 1 required keyword-only argument: 'title'"),
         ("milliseconds = 2.5", "milliseconds = nan", "milliseconds = nan: give a number above 0"),
