@@ -17,9 +17,8 @@ from benchmarks.external.roll_out_files import (
     parse_roll_out,
     read_roll_out,
 )
-from benchmarks.methods import find_method
 from benchmarks.methods.outside import entry_of
-from benchmarks.metric import Estimate, RollOut, SceneRollOuts
+from benchmarks.metric import Estimate, RollOut
 from benchmarks.plan.study import option, read_study
 from benchmarks.runner.cells import judge
 from benchmarks.runner.measurements import measured
@@ -33,7 +32,7 @@ from reference_sim.trajectory import (
     write_obj,
     write_point_cache,
 )
-from tests.benchmarks.runner.tasks_by_hand import small_scene, thirds
+from tests.benchmarks.runner.tasks_by_hand import grouped, small_scene, thirds
 
 SCENE = small_scene("hanging_sheet", cells=6, frames=8)
 FACES = SCENE.cloth.faces
@@ -83,22 +82,14 @@ def prepared(path: str, **stated):
 def rows(path: str, **stated) -> dict:
     """Every number that is measured of the file, in suite speed."""
     method, entry = prepared(path, **stated)
-    return rows_of(method.run(), entry)
-
-
-def rows_of(trajectory: Trajectory, entry) -> dict:
-    group = SceneRollOuts(SCENE, gap_samples=2)
-    group.roll_outs.append(RollOut(group, entry, trajectory, suites=("speed",)))
+    group = grouped(SCENE, {})
+    group.roll_outs.append(RollOut(group, entry, method.run(), suites=("speed",)))
     return measured(group.roll_outs[0])[0]
 
 
 def direct(positions: np.ndarray) -> dict:
     """The numbers of positions that were in no file."""
-    trajectory = Trajectory(positions, FACES, np.arange(len(positions)) * SCENE.dt)
-    return rows_of(trajectory, find_method("skinning"))
-
-
-# --- one set of positions, many formats ------------------------------------------------------------------
+    return measured(grouped(SCENE, {"skinning": positions}, suites=("speed",)).roll_outs[0])[0]
 
 
 @pytest.mark.parametrize("kind", ["vtkhdf", "npz", "pkl", "obj"])
@@ -199,10 +190,7 @@ def test_another_mesh_of_the_same_surface_is_compared_as_a_surface_alone(tmp_pat
     assert method.quasi_static() is None
     state = judge(trajectory, Reading(0.0), SCENE, truncated=False, other_mesh=True)
     assert state[0] == "ok" and judge(trajectory, Reading(0.0), SCENE, truncated=False)[0] == "failed"
-    group = SceneRollOuts(SCENE, gap_samples=2)
-    times = np.arange(SCENE.frames) * SCENE.dt
-    simulated = RollOut(group, find_method("simulation"), Trajectory(X, FACES, times), suites=("speed",))
-    group.roll_outs.append(simulated)
+    group = grouped(SCENE, {"simulation": X})
     metrics = measured(RollOut(group, entry, trajectory, suites=("speed",)))[0]
     assert set(metrics) == {"surface/chamfer", "surface/normals"} and metrics["surface/chamfer"] < 1e-9
 
@@ -227,9 +215,6 @@ def test_a_wrong_option_is_one_line(text, hint):
         name, table = parse_roll_out(text)
         read_study(options=[option("--rollout", "rollouts", {name: table})])
     assert "\n" not in str(refused.value)
-
-
-# --- damaged files ---------------------------------------------------------------------------------------
 
 
 def test_a_size_that_the_file_cannot_hold_is_refused_before_it_is_allocated(tmp_path):
