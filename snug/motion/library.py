@@ -127,7 +127,7 @@ def make_motion(name: str) -> Motion:
         recorded = _read_clip(clip)
         return recorded if name == clip else _segment(name, recorded)
     # Its curves need SciPy; names are listed without.
-    from snug.motion.actions import make_clip
+    from snug.motion.coded import make_clip
 
     return spread_arms(make_clip(name))
 

@@ -30,20 +30,17 @@ SPINE_SHARES = (("spine1", 0.3), ("spine2", 0.3), ("spine3", 0.4))
 # Foot to shank, passive range; beyond it the heel comes off the floor instead.
 ANKLE_RANGE = (-55.0, 30.0)
 RATE = 120.0  # [1/s] at which motions are built
-LIBRARY_FPS = 30.0  # [1/s] at which they are handed out
 SMOOTHING = 0.03  # [s] muscles do not start at once: standard deviation of the Gaussian over all angles
 FREE_FALL = 9.81  # [m/s^2]
 CONTACT_DEPTH = 0.01  # [m] a sole point this much higher than the lowest carries 1/e of its weight
 
 
-def poses_from_angles(angles: Mapping[str, np.ndarray], frames: int) -> np.ndarray:
+def poses_from_angles(angles: Mapping[str, np.ndarray | float], frames: int) -> np.ndarray:
     """Return poses (frames, 24, 3) [rad] of angles by name, (frames,) [degrees].
 
-    Absent names stand at ease. Raises KeyError for an angle that does not exist.
+    Absent names stand at ease.
     """
-    unknown = sorted(set(angles) - set(STANDING))
-    if unknown:
-        raise KeyError(f"no such joint angle: {', '.join(unknown)}")
+    assert angles.keys() <= STANDING.keys(), "no such joint angle"
     a = {name: np.broadcast_to(angles.get(name, value), frames) for name, value in STANDING.items()}
     a = {name: gaussian_filter1d(values, SMOOTHING * RATE, mode="nearest") for name, values in a.items()}
     poses = np.zeros((frames, 24, 3))

@@ -1,21 +1,58 @@
-"""Walking, running and stopping, from published normative joint-angle curves.
+"""Motions made by code, by name: actions on the spot, gaits, and stops within one frame.
 
-Twists and turning walks end within one frame, as no body can: they set a wide hem swinging and let it ring,
-so that the cloth moves by itself and its motion cannot be told from the pose.
+Actions are tables of key angles (actions.toml, where the columns are explained), gaits follow published
+normative joint-angle curves. Twists and turning walks end within one frame, as no body can: they set a wide
+hem swinging and let it ring, so that the cloth moves by itself and its motion cannot be told from the pose.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
 
 import numpy as np
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.spatial.transform import Rotation
 
 from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
-from snug.motion.motion import smoothstep
-from snug.motion.posture import LIBRARY_FPS, RATE, SPINE_SHARES, STANDING, poses_from_angles, root_path
+from snug.motion.motion import Motion, smoothstep
+from snug.motion.posture import RATE, SIDED, SPINE_SHARES, STANDING, poses_from_angles, root_path
+
+Frames = tuple[np.ndarray, np.ndarray]  # poses (T, 24, 3) [rad] and root translations (T, 3) [m]
+
+LIBRARY_FPS = 30.0  # [1/s] at which motions are handed out
+EVERY = round(RATE / LIBRARY_FPS)
+
+
+def act(
+    seconds: float,
+    keys: Mapping[str, Sequence[Sequence[float]]],
+    flights: Sequence[Sequence[float]] = (),
+    cycles: int = 1,
+) -> Frames:
+    """Make an action of a table of keys, (time [s], angle [degrees]), repeated `cycles` times; at RATE.
+
+    Between keys the angle is monotone (PCHIP: continuous slope, no overshoot), before the first and after
+    the last it rests.
+    """
+    frames = round(seconds * cycles * RATE)
+    within = (np.arange(frames) / RATE) % seconds
+    angles: dict[str, np.ndarray] = {}
+    for name, points in keys.items():
+        at, degrees = np.array(points, dtype=float).T
+        if len(points) == 1:
+            values = np.full(frames, degrees[0])
+        else:
+            values = PchipInterpolator(at, degrees)(np.clip(within, at[0], at[-1]))
+        sides = (f"left_{name}", f"right_{name}") if name in SIDED else (name,)
+        angles |= {side: values for side in sides if side == name or side not in keys}
+    poses = poses_from_angles(angles, frames)
+    starts = seconds * np.arange(cycles)
+    return poses, root_path(poses, [(s + start, s + end) for s in starts for start, end in flights])
+
 
 START_SECONDS = 0.7  # from standing to the full stride
 Curve = tuple[tuple[float, float], ...]  # (percent of the stride from that foot's contact, degrees)
@@ -87,39 +124,18 @@ CLIMB = Stride(
 STOP_SECONDS = 0.35  # from the full stride to standing
 
 
-@dataclass(frozen=True)
-class Gait:
-    """A stride repeated for some seconds, at a share `pace` of its normal rate, braked from `stop` [s] on."""
-
-    kind: str
-    stride: Stride
-    seconds: float
-    pace: float = 1.0
-    stop: float | None = None
-
-    def motion(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return poses (T, 24, 3) [rad] and root translations (T, 3) [m] at RATE."""
-        time = np.arange(round(self.seconds * RATE)) / RATE
-        size = smoothstep(time / START_SECONDS)
-        if self.stop is None:
-            return gait_motion(self.stride, self.pace, size, {})
-        size *= 1.0 - smoothstep((time - self.stop) / STOP_SECONDS)
-        return gait_motion(self.stride, self.pace, size, _brake(time - self.stop))
+def gait(stride: Stride, seconds: float, pace: float = 1.0, stop: float | None = None) -> Frames:
+    """Make a stride repeated for some seconds, at a share `pace` of its rate, braked from `stop` [s] on."""
+    time = np.arange(round(seconds * RATE)) / RATE
+    size = smoothstep(time / START_SECONDS)
+    if stop is None:
+        return gait_motion(stride, pace, size, {})
+    size *= 1.0 - smoothstep((time - stop) / STOP_SECONDS)
+    return gait_motion(stride, pace, size, _brake(time - stop))
 
 
-GAITS = {
-    "walk": Gait("walk", WALK, 4.0),
-    "brisk_walk": Gait("walk", WALK, 3.0, pace=1.25),
-    "run": Gait("run", RUN, 3.0),
-    "sudden_stop": Gait("sudden stop", RUN, 3.0, pace=0.9, stop=1.53),
-    "climbing_steps": Gait("climbing steps", CLIMB, 2.4),
-}
-
-
-def gait_motion(
-    stride: Stride, pace: float, size: np.ndarray, added: Mapping[str, np.ndarray]
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return poses (T, 24, 3) [rad] and root translations (T, 3) [m] of a gait, at RATE.
+def gait_motion(stride: Stride, pace: float, size: np.ndarray, added: Mapping[str, np.ndarray]) -> Frames:
+    """Return poses and root translations of a gait, at RATE.
 
     Args:
         stride: that is repeated.
@@ -215,83 +231,91 @@ def _periodic(curve: Curve, at: np.ndarray) -> np.ndarray:
 
 FROZEN_FRAMES = 36  # frames after the stop: over a second, in which a hem comes to rest
 STANCE = {
-    "hip_abduction": 9.0, "knee_flexion": 10.0, "hip_flexion": 6.0, "arm_lowering": 34.0,
-    "arm_flexion": 12.0, "elbow_flexion": 60.0,
+    f"{side}_{name}": degrees
+    for side in ("left", "right")
+    for name, degrees in (
+        ("hip_abduction", 9.0), ("knee_flexion", 10.0), ("hip_flexion", 6.0), ("arm_lowering", 34.0),
+        ("arm_flexion", 12.0), ("elbow_flexion", 60.0))
 }  # fmt: skip
 ONSET = 0.5  # [s] from rest to the full swing
 
 
-@dataclass(frozen=True)
-class Twist:
-    """The chest yaws by `degrees` at `hertz`, the pelvis by the share `hips` of it, until `stop` [s].
+def twist(degrees: float, hertz: float, hips: float, stop: float) -> Frames:
+    """Yaw the chest by `degrees` at `hertz`, the pelvis by the share `hips` of it, until `stop` [s].
 
-    With hips = 1 the body turns as one piece, as on a turntable.
+    With hips = 1 the body turns as one piece, as on a turntable. At LIBRARY_FPS.
     """
-
-    degrees: float
-    hertz: float
-    hips: float
-    stop: float
-
-    def motion(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return poses (T, 24, 3) [rad] and translations (T, 3) [m] at LIBRARY_FPS, feet on the floor."""
-        time = np.arange(round(self.stop * LIBRARY_FPS) + 1 + FROZEN_FRAMES) / LIBRARY_FPS
-        time = np.minimum(time, round(self.stop * LIBRARY_FPS) / LIBRARY_FPS)
-        yaw = self.degrees * np.sin(2 * np.pi * self.hertz * time) * smoothstep(time / ONSET)
-        sided = {
-            f"{side}_{name}": np.array(value) for side in ("left", "right") for name, value in STANCE.items()
-        }
-        poses = poses_from_angles(sided, len(time))
-        _turn(poses, "pelvis", self.hips * yaw)
-        for name, share in SPINE_SHARES:
-            _turn(poses, name, share * (1.0 - self.hips) * yaw)
-        translations = np.zeros((len(time), 3))
-        translations[:, 1] = root_path(poses[:2])[0, 1]
-        return poses, translations
+    time = np.arange(round(stop * LIBRARY_FPS) + 1 + FROZEN_FRAMES) / LIBRARY_FPS
+    time = np.minimum(time, round(stop * LIBRARY_FPS) / LIBRARY_FPS)
+    yaw = degrees * np.sin(2 * np.pi * hertz * time) * smoothstep(time / ONSET)
+    poses = poses_from_angles(STANCE, len(time))
+    for name, share in (("pelvis", hips), *((name, share * (1.0 - hips)) for name, share in SPINE_SHARES)):
+        turn = Rotation.from_euler("y", (share * yaw)[:, None], degrees=True).as_matrix()
+        poses[:, JOINT[name]] = axis_angles(turn @ rotation_matrices(poses[:, JOINT[name]]))
+    translations = np.zeros((len(time), 3))
+    translations[:, 1] = root_path(poses[:2])[0, 1]
+    return poses, translations
 
 
-@dataclass(frozen=True)
-class TurningWalk:
-    """A walk whose heading swings by `degrees` at `hertz`, at a pace, and freezes after `stop` [s]."""
+def turning_walk(degrees: float, hertz: float, pace: float, stop: float) -> Frames:
+    """Walk with a heading that swings by `degrees` at `hertz`, at a pace, frozen after `stop` [s].
 
-    degrees: float
-    hertz: float
-    pace: float
-    stop: float
-
-    def motion(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return poses (T, 24, 3) [rad] and translations (T, 3) [m] at LIBRARY_FPS."""
-        time = np.arange(round(self.stop * RATE) + 1) / RATE
-        size = smoothstep(time / START_SECONDS)
-        yaw = self.degrees * size * np.sin(2 * np.pi * self.hertz * time)
-        poses, path = gait_motion(WALK, self.pace, size, {"pelvis_yaw": yaw})
-        every = round(RATE / LIBRARY_FPS)
-        poses, path = poses[::every], path[::every]
-        frozen = np.minimum(np.arange(len(poses) + FROZEN_FRAMES), len(poses) - 1)
-        return poses[frozen], path[frozen] - path[0] * [1.0, 0.0, 1.0]
+    At LIBRARY_FPS.
+    """
+    time = np.arange(round(stop * RATE) + 1) / RATE
+    size = smoothstep(time / START_SECONDS)
+    yaw = degrees * size * np.sin(2 * np.pi * hertz * time)
+    poses, path = gait_motion(WALK, pace, size, {"pelvis_yaw": yaw})
+    poses, path = poses[::EVERY], path[::EVERY]
+    frozen = np.minimum(np.arange(len(poses) + FROZEN_FRAMES), len(poses) - 1)
+    return poses[frozen], path[frozen] - path[0] * [1.0, 0.0, 1.0]
 
 
-def _turn(poses: np.ndarray, joint: str, degrees: np.ndarray) -> None:
-    """Yaw one joint by degrees (T,) before the rotation that it has."""
-    yaw = Rotation.from_euler("y", degrees[:, None], degrees=True).as_matrix()
-    poses[:, JOINT[joint]] = axis_angles(yaw @ rotation_matrices(poses[:, JOINT[joint]]))
+Made = tuple[str, str, Callable[[], Frames]]  # kind, source, function
 
 
-# Signs, phases and amplitudes of the stops differ.
-STOPS: dict[str, Twist | TurningWalk] = {
-    "twist_1": Twist(-30.0, 0.7, 0.33, 1.6),
-    "twist_2": Twist(55.0, 0.8, 0.33, 2.1),
-    "twist_3": Twist(-38.0, 1.3, 0.33, 1.5),
-    "twist_4": Twist(60.0, 0.6, 0.5, 1.9),
-    "twist_5": Twist(-25.0, 1.6, 0.5, 1.3),
-    "twist_6": Twist(50.0, 1.15, 0.2, 1.6),
-    "turntable_1": Twist(35.0, 0.8, 1.0, 1.7),
-    "turntable_2": Twist(-50.0, 0.65, 1.0, 2.2),
-    "turntable_3": Twist(28.0, 1.4, 1.0, 1.5),
-    "turning_walk_1": TurningWalk(25.0, 0.5, 1.0, 2.6),
-    "turning_walk_2": TurningWalk(-40.0, 0.35, 0.85, 2.3),
-    "turning_walk_3": TurningWalk(15.0, 0.8, 1.2, 2.0),
-    "turning_walk_4": TurningWalk(-30.0, 0.6, 1.1, 3.0),
-    "twist_stop": Twist(45.0, 1.0, 0.33, 1.9),
-    "turning_stop": TurningWalk(32.0, 0.45, 0.95, 2.4),
+def _actions() -> dict[str, Made]:
+    tables = tomllib.loads(Path(__file__).with_name("actions.toml").read_text(encoding="utf-8"))
+    return {name: (table.pop("kind"), "key angles", partial(act, **table)) for name, table in tables.items()}
+
+
+GAITS: dict[str, tuple[str, Callable[[], Frames]]] = {
+    "walk": ("walk", partial(gait, WALK, 4.0)),
+    "brisk_walk": ("walk", partial(gait, WALK, 3.0, pace=1.25)),
+    "run": ("run", partial(gait, RUN, 3.0)),
+    "sudden_stop": ("sudden stop", partial(gait, RUN, 3.0, pace=0.9, stop=1.53)),
+    "climbing_steps": ("climbing steps", partial(gait, CLIMB, 2.4)),
 }
+# Signs, phases and amplitudes differ.
+STOPS: dict[str, Callable[[], Frames]] = {
+    "twist_1": partial(twist, -30.0, 0.7, 0.33, 1.6),
+    "twist_2": partial(twist, 55.0, 0.8, 0.33, 2.1),
+    "twist_3": partial(twist, -38.0, 1.3, 0.33, 1.5),
+    "twist_4": partial(twist, 60.0, 0.6, 0.5, 1.9),
+    "twist_5": partial(twist, -25.0, 1.6, 0.5, 1.3),
+    "twist_6": partial(twist, 50.0, 1.15, 0.2, 1.6),
+    "turntable_1": partial(twist, 35.0, 0.8, 1.0, 1.7),
+    "turntable_2": partial(twist, -50.0, 0.65, 1.0, 2.2),
+    "turntable_3": partial(twist, 28.0, 1.4, 1.0, 1.5),
+    "turning_walk_1": partial(turning_walk, 25.0, 0.5, 1.0, 2.6),
+    "turning_walk_2": partial(turning_walk, -40.0, 0.35, 0.85, 2.3),
+    "turning_walk_3": partial(turning_walk, 15.0, 0.8, 1.2, 2.0),
+    "turning_walk_4": partial(turning_walk, -30.0, 0.6, 1.1, 3.0),
+    "twist_stop": partial(twist, 45.0, 1.0, 0.33, 1.9),
+    "turning_stop": partial(turning_walk, 32.0, 0.45, 0.95, 2.4),
+}
+MADE: dict[str, Made] = {
+    **_actions(),
+    **{name: (kind, "normative gait curves", make) for name, (kind, make) in GAITS.items()},
+    **{name: ("stop", "stops within a frame", make) for name, make in STOPS.items()},
+}
+
+
+def make_clip(name: str) -> Motion:
+    """Make the library's motion of that name, arms as in its tables. Raises KeyError for an unknown name."""
+    kind, source, make = MADE[name]
+    poses, path = make()
+    if name not in STOPS:
+        path[:, [0, 2]] -= path[0, [0, 2]]
+        poses, path = poses[::EVERY], path[::EVERY]
+    return Motion(name, poses, path, LIBRARY_FPS, kind, f"embedded library: {source}")
