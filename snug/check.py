@@ -44,16 +44,16 @@ def describe(garment: Garment, body: Body) -> Iterator[tuple[str, str]]:
     from reference_sim.files.mesh_files import stretches
     from reference_sim.geometry.topology import corner_angles
     from reference_sim.obstacle import Obstacle
-    from snug.garments.fit import measure_fit
     from snug.garments.garment import piece_of_faces
 
     positions, faces = garment.rest_positions, garment.faces
-    fit = measure_fit(body, Obstacle(body.template, body.faces), positions)
+    distances = Obstacle(body.template, body.faces).signed_distance(positions, 0)
     yield "mesh", f"{len(positions)} vertices, {len(faces)} triangles"
     yield "pieces", f"{piece_of_faces(faces).max() + 1}"
     yield "smallest angle", f"{np.degrees(corner_angles(positions, faces).min()):.1f} degrees"
     yield "size", " x ".join(f"{length:.2f}" for length in np.ptp(positions, axis=0)) + " m"
-    yield "below the skin", f"{fit.below:.1%} of the vertices, the deepest by {1e3 * fit.depth:.1f} mm"
+    below, depth = np.mean(distances < 0), max(0.0, -distances.min())
+    yield "below the skin", f"{below:.1%} of the vertices, the deepest by {1e3 * depth:.1f} mm"
     if garment.rest_uv is not None:
         strain = np.abs(stretches(positions[faces], garment.rest_uv) - 1).max()
         yield "UV chart", f"stretched by up to {strain:.0%} on the mesh"

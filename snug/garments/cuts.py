@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from reference_sim.geometry.topology import boundary_loops
 from snug.body.parametric_body import Body
 from snug.garments.implicit_surface import (
+    GRID_SPACING,
     SHIRT_BONES,
     TORSO_BONES,
     ImplicitSurface,
@@ -128,7 +129,7 @@ def cut_sheet(surface: ImplicitSurface, cuts: list[CutPlane]) -> tuple[Array, In
 
     grid = pyvista.ImageData(
         dimensions=surface.values.shape,
-        spacing=(surface.spacing,) * 3,
+        spacing=(GRID_SPACING,) * 3,
         origin=tuple(map(float, surface.origin)),
     )
     grid["field"] = surface.values.ravel(order="F")

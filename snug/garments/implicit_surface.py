@@ -55,7 +55,6 @@ SUPPORT_DIRECTIONS = 64  # support directions of a convex section: 0.1 % of girt
 ARMPIT_FILLET = 0.08  # [m] range over which torso and sleeve melt into each other
 CROTCH_FILLET = 0.03  # [m] the same between torso and leg
 TAPER = 0.4  # how steeply trousers may narrow from the seat to the thighs
-MAX_CELLS = 4e6  # of the grid: a person takes a tenth
 
 
 @dataclass(frozen=True)
@@ -63,32 +62,30 @@ class ImplicitSurface:
     """Signed field, negative inside, on a grid over x >= 0 (three more planes beyond, mirrored).
 
     Attributes:
-        origin: (3,) [m] of the first node.
-        spacing: [m] of the nodes.
+        origin: (3,) [m] of the first node; they are GRID_SPACING apart.
         values: (nx, ny, nz) [m], close to a distance near zero.
         coefficients: of a cubic spline through `values`.
     """
 
     origin: Array
-    spacing: float
     values: Array
-    coefficients: Array  # cubic spline coefficients of `values`
+    coefficients: Array
 
     def field(self, points: Array) -> Array:
         """Return the field (N,) [m] at points (N,3) [m], cubic between the nodes."""
-        nodes = ((points - self.origin) / self.spacing).T
+        nodes = ((points - self.origin) / GRID_SPACING).T
         return ndimage.map_coordinates(self.coefficients, nodes, order=3, prefilter=False, mode="nearest")
 
     def gradient(self, points: Array) -> Array:
         """Return the gradient (N,3) of the field at points (N,3), by central differences of half a cell."""
-        step = 0.5 * self.spacing
+        step = 0.5 * GRID_SPACING
         shifts = step * np.eye(3)
         columns = [self.field(points + s) - self.field(points - s) for s in shifts]
         return np.stack(columns, axis=1) / (2 * step)
 
-    def project(self, points: Array, steps: int = 2) -> Array:
-        """Move points (N,3) onto the zero level along the gradient."""
-        for _ in range(steps):
+    def project(self, points: Array) -> Array:
+        """Move points (N,3) onto the zero level along the gradient, in two steps."""
+        for _ in range(2):
             slope = self.gradient(points)
             length2 = np.maximum(np.sum(slope * slope, axis=1), 0.05)
             points = points - (self.field(points) / length2)[:, None] * slope
@@ -135,13 +132,12 @@ class _Sections:
 
     def __init__(self, body: Body, nodes: Sequence[Array]) -> None:
         self.body, self.nodes = body, nodes
-        self.points = np.asarray(body.template, dtype=np.float64)
         angle = 2 * np.pi * np.arange(SUPPORT_DIRECTIONS) / SUPPORT_DIRECTIONS
         self.normals = np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
     def support(self, edges: Index, axis: int) -> Array:
         """Return the support function (L,K) of the sections of edges (E,2) at each node of an axis."""
-        return _fill_levels(_section_support(self.points, edges, self.nodes[axis], axis, self.normals))
+        return _fill_levels(_section_support(self.body.template, edges, self.nodes[axis], axis, self.normals))
 
     def field(self, support: Array, growth: Array, axis: int) -> Array:
         """Return the distance (nx,ny,nz) to sections `support` (L,K) grown by `growth` (L,)."""
@@ -197,8 +193,7 @@ def _leg(sections: _Sections, edges: Index, crotch: float, ease: float, clearanc
 
 def legs_part(body: Body, room: float) -> float:
     """Return the height [m] below which trousers have two legs: `room` [m] from the thigh's skin to x = 0."""
-    points = np.asarray(body.template, dtype=np.float64)
-    edges = _edges(body, LEG_BONES)
+    points, edges = body.template, _edges(body, LEG_BONES)
     knee, hip = (joint_position(body, name)[1] for name in ("left_knee", "left_hip"))
     levels = np.arange(knee, hip, 0.5 * GRID_SPACING)
     inner = _fill_levels(_section_support(points, edges, levels, 1, np.array([[-1.0, 0.0]])))[:, 0]
@@ -209,13 +204,9 @@ def legs_part(body: Body, room: float) -> float:
 
 
 def _edges(body: Body, bones: Sequence[str]) -> Index:
-    """Return the edges (E,2) of the body between vertices that follow `bones`. Raises ValueError."""
-    faces = np.asarray(body.faces, dtype=np.int64)
-    edges, _ = edge_uses(faces)
-    edges_of_bones = edges[skin_following(body, bones)[edges].all(axis=1)]
-    if not len(edges_of_bones):
-        raise ValueError(f"no skin follows {', '.join(bones)}: check the body's weights and joints")
-    return edges_of_bones
+    """Return the edges (E,2) of the body between vertices that follow `bones`."""
+    edges, _ = edge_uses(body.faces)
+    return edges[skin_following(body, bones)[edges].all(axis=1)]
 
 
 def build_surface(
@@ -235,14 +226,10 @@ def build_surface(
         flare: how much further [m] the hem stands off than waist or hips, all around.
         waistband: whether it hangs from the hips instead of the shoulders.
         legs: whether it is a pair of trousers.
-
-    Raises:
-        ValueError: a body too large for the grid.
     """
     import igl  # not loaded where garments are only named
 
-    points = np.asarray(body.template, dtype=np.float64)
-    faces = np.asarray(body.faces, dtype=np.int64)
+    points = body.template
     torso_edges, arm_edges, leg_edges = (_edges(body, b) for b in (TORSO_BONES, ARM_BONES, LEG_BONES))
     torso, arm, leg = (skin_following(body, bones) for bones in (TORSO_BONES, ARM_BONES, LEG_BONES))
     hang = top if waistband else points[skin_following(body, ARM_BONES[:1]), 1].min()
@@ -254,15 +241,12 @@ def build_surface(
     low = np.array([0.0, hem - margin, depth.min() - reach])
     high = np.array([side, top + margin, depth.max() + reach])
     counts = np.ceil((high - low) / GRID_SPACING).astype(int) + 1
-    if not 0 < np.prod(counts.astype(float)) <= MAX_CELLS:
-        size = " x ".join(f"{length:.3g}" for length in high - low)
-        raise ValueError(f"half of it would be {size} m: give a body in metres, with its joints inside")
     nodes = [low[i] + GRID_SPACING * np.arange(counts[i]) for i in range(3)]
     grid = np.stack(np.meshgrid(*nodes, indexing="ij"), axis=-1).reshape(-1, 3)
     # The fast sign is a quarter of the time; it moves the distance by under a millimetre, and what is
     # promised about clearance is enforced on the finished mesh.
     sign = igl.SIGNED_DISTANCE_TYPE_FAST_WINDING_NUMBER
-    distance = igl.signed_distance(grid, points, faces, sign_type=sign)[0].reshape(counts)
+    distance = igl.signed_distance(grid, points, body.faces, sign_type=sign)[0].reshape(counts)
     sections, y = _Sections(body, nodes), nodes[1]
     growth = clearance + ease / (2 * np.pi) * _ramp(y, hang, waist)
     growth += flare * np.clip((waist - y) / (waist - hem), 0.0, None)  # a cone: its sides are straight
@@ -283,4 +267,4 @@ def build_surface(
     soft = ndimage.gaussian_filter(values, 1.0)
     values = 2 * soft - ndimage.gaussian_filter(soft, 1.0)
     origin = low - [ghost * GRID_SPACING, 0, 0]
-    return ImplicitSurface(origin, GRID_SPACING, values, ndimage.spline_filter(values, order=3))
+    return ImplicitSurface(origin, values, ndimage.spline_filter(values, order=3))

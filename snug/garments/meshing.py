@@ -8,7 +8,7 @@ triangles around them, kept on the surface, between Delaunay flips.
 from __future__ import annotations
 
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,7 +22,6 @@ from snug.garments.implicit_surface import SHIRT_BONES, ImplicitSurface, skin_fo
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
-Projection = Callable[[Array], Array]  # points (N,3) [m] onto a surface
 
 # Triangles pull with their area to this power. Power 1 (Lloyd's iteration) left areas of 0.45 to 2.0 of the
 # mean at 2000 to 8000 vertices, power 3 leaves 0.52 to 1.9; it needs the short step, a full one oscillates.
@@ -80,11 +79,10 @@ def delaunay_flips(points: Array, faces: Index, *, passes: int = 3) -> Index:
     return faces
 
 
-def relax(points: Array, faces: Index, held: NDArray[np.bool_], project: Projection) -> tuple[Array, Index]:
-    """Move vertices towards larger triangles, and flip edges; `held` (V,) vertices stay.
-
-    project: maps points (N,3) back onto the surface.
-    """
+def relax(
+    points: Array, faces: Index, held: NDArray[np.bool_], surface: ImplicitSurface
+) -> tuple[Array, Index]:
+    """Move vertices along the surface towards larger triangles, and flip edges; `held` (V,) vertices stay."""
     points = points.copy()
     for _ in range(RELAXATIONS):
         faces = delaunay_flips(points, faces, passes=1)
@@ -96,7 +94,7 @@ def relax(points: Array, faces: Index, held: NDArray[np.bool_], project: Project
             np.add.at(weight, faces[:, k], pull)
             np.add.at(target, faces[:, k], pull[:, None] * centroids)
         moved = points + RELAXATION_STEP * (target / weight[:, None] - points)
-        points[~held] = project(moved[~held])
+        points[~held] = surface.project(moved[~held])
     return points, delaunay_flips(points, faces)
 
 
@@ -153,7 +151,7 @@ def _place_rim(points: Array, loop: Index, outline: list[Array]) -> None:
 
 
 def remesh(
-    points: Array, faces: Index, outlines: list[list[Array]], count: int, project: Projection
+    points: Array, faces: Index, outlines: list[list[Array]], count: int, surface: ImplicitSurface
 ) -> tuple[Array, Index]:
     """Remesh a sheet whose boundary loops are the `outlines` evenly, with about `count` vertices.
 
@@ -162,7 +160,7 @@ def remesh(
         faces: (M,3).
         outlines: per loop its curves (P,3) end to end along the winding; one curve alone is closed.
         count: number of vertices.
-        project: maps points (N,3) back onto the surface.
+        surface: that the vertices stay on.
 
     Raises:
         ValueError: the clusters are too coarse to keep the sheet's topology.
@@ -177,7 +175,7 @@ def remesh(
         _place_rim(coarse, loops[int(np.argmin(np.linalg.norm(centres - centre, axis=1)))], outline)
     held = np.zeros(len(coarse), dtype=bool)
     held[np.concatenate(loops)] = True
-    return relax(coarse, triangles, held, project)
+    return relax(coarse, triangles, held, surface)
 
 
 AREA_BOUNDS = (0.5, 2.0)  # every triangle's area over the mean
@@ -212,7 +210,7 @@ def mesh_garment(
             half += 1
         tried.add(half)
         try:
-            points, faces = remesh(sheet, sheet_faces, rims, half, surface.project)
+            points, faces = remesh(sheet, sheet_faces, rims, half, surface)
             count = 2 * len(points) - int(np.count_nonzero(np.abs(points[:, 0]) < 1e-6))
             if abs(count - vertices) > max(1, vertices // 100):
                 half += (vertices - count) // 2
@@ -240,10 +238,9 @@ def _keep_off(body: Body, points: Array, faces: Index, cuts: list[CutPlane], cle
     """
     import igl  # not loaded where garments are only named
 
-    skin, skin_faces = np.asarray(body.template, dtype=np.float64), np.asarray(body.faces, dtype=np.int64)
     # Of a body that is not quite symmetric, both of its sides.
-    skin = np.concatenate([skin, skin * [-1.0, 1.0, 1.0]])
-    skin_faces = np.concatenate([skin_faces, skin_faces[:, ::-1] + len(body.template)])
+    skin = np.concatenate([body.template, body.template * [-1.0, 1.0, 1.0]])
+    skin_faces = np.concatenate([body.faces, body.faces[:, ::-1] + len(body.template)])
     a, b, c = (skin[skin_faces[:, k]] for k in range(3))
     outward = np.cross(b - a, c - a)
     tree = igl.AABB()
@@ -297,4 +294,4 @@ def _check_even(points: Array, faces: Index, wanted: int) -> None:
 def nearest_body_vertices(body: Body, positions: Array, bones: Sequence[str] = SHIRT_BONES) -> Index:
     """Return the nearest template vertex (V,) that follows one of `bones` to each position (V,3) [m]."""
     allowed = np.flatnonzero(skin_following(body, bones))
-    return allowed[cKDTree(np.asarray(body.template)[allowed]).query(positions)[1]]
+    return allowed[cKDTree(body.template[allowed]).query(positions)[1]]

@@ -3,18 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from reference_sim.cloth import Cloth, MeshError
-from reference_sim.files.mesh_files import METRES, Surface, join_seams, read_mesh, rest_chart, to_metres_y_up
+from reference_sim.files.mesh_files import (
+    METRES,
+    UP_AXES,
+    Surface,
+    join_seams,
+    read_mesh,
+    rest_chart,
+    to_metres_y_up,
+)
 from reference_sim.material import Material, MaterialError
 from reference_sim.obstacle import Obstacle
 from snug.body.parametric_body import Body
 from snug.file_options import GarmentFile
-from snug.garments.fit import find_units, measure_fit
 from snug.garments.garment import (
     Garment,
     GarmentError,
@@ -23,10 +31,19 @@ from snug.garments.garment import (
     open_seam,
     piece_of_faces,
 )
+from snug.garments.implicit_surface import skin_following
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
+TRAPPED_DEPTH = 0.02  # [m] below the skin, from which contact may not find the way out
+TRAPPED_SHARE = 0.05  # of the vertices that may be so deep
+MAX_DEPTH = 0.04  # [m], half the thickness of an arm
+WORN_DISTANCE = 0.05  # [m] from the skin: whatever is worn has a tenth of its vertices there
+WORN_SHARE = 0.1
+SIZE_RANGE = 0.1, 1.2  # largest extent of a garment [heights of the body]
+ENDS = ("head", "left_wrist", "right_wrist", "left_hand", "right_hand", "left_ankle", "right_ankle",
+        "left_foot", "right_foot")  # fmt: skip
 OUTWARD = 0.5  # share of the area that looks away from the skin, below which a piece is inside out
 AREAL_DENSITIES = 0.005, 5.0  # [kg/m^2], lightest and heaviest cloth: beyond them a unit is mistaken
 
@@ -108,15 +125,41 @@ def _make_garment(file: GarmentFile, body: Body, raw: Surface, material: Materia
 
 
 def _check_place(file: GarmentFile, body: Body, skin: Obstacle, raw: Array, positions: Array) -> None:
-    """Raise ValueError unless the garment (V,3) [m] lies on the body; say what mends it."""
-    problem = measure_fit(body, skin, positions).problem
-    if not problem:
+    """Raise ValueError unless the garment (V,3) [m] lies on the body; say which unit or axis mends it."""
+    distances = skin.signed_distance(positions, 0)
+    if not (problem := _misfit(body, skin, positions, distances)):
         return
     size = " x ".join(f"{length:.2f}" for length in np.ptp(positions, axis=0))
     remedy = "move it onto the unposed body, facing +z with y up"
-    if choice := find_units(body, skin, raw, np.asarray(file.shift)):
-        remedy = f"give '{file.path.name},units={choice[0]},up={choice[1]}'"
+    worn = {}
+    for units, up in product(METRES, UP_AXES):
+        moved = to_metres_y_up(raw, units=units, up=up) + np.asarray(file.shift)
+        distances = skin.signed_distance(moved, 0)
+        if not _misfit(body, skin, moved, distances):
+            worn[units, up] = np.abs(distances).mean()
+    if worn:
+        units, up = min(worn, key=worn.__getitem__)
+        remedy = f"give '{file.path.name},units={units},up={up}'"
     raise ValueError(f"does not lie on the body ({size} m, {problem}): {remedy}")
+
+
+def _misfit(body: Body, skin: Obstacle, positions: Array, distances: Array) -> str:
+    """Return why nothing can be simulated from a garment's place (V,3) [m] on the body, or empty.
+
+    distances: (V,) [m] of its vertices to the skin, negative below it.
+    """
+    size = np.ptp(positions, axis=0).max() / body.height
+    if not SIZE_RANGE[0] < size < SIZE_RANGE[1]:
+        return f"its largest extent is {size:.3g} times the body's height"
+    if np.mean(np.abs(distances) < WORN_DISTANCE) < WORN_SHARE:
+        return f"it lies {1e3 * np.median(np.abs(distances)):.0f} mm from the body"
+    depth = -distances.min()
+    if depth > MAX_DEPTH or np.mean(distances < -TRAPPED_DEPTH) > TRAPPED_SHARE:
+        share = np.mean(distances < 0)
+        return f"it lies up to {1e3 * depth:.0f} mm deep in the body, with {share:.0%} of it"
+    at_ends = skin_following(body, ENDS)[body.faces].all(axis=1)
+    share = at_ends[skin.planes(positions, 0).faces].mean()
+    return f"{share:.0%} of it lies around head, hands or feet" if share > 0.5 else ""
 
 
 def _wind_outward(

@@ -42,7 +42,6 @@ class GarmentTemplate:
 
     Attributes:
         name: as commands take it.
-        description: in words.
         measures: each measure of its cut and the default, see `tailor`.
         outline: function of body and measures that returns the arguments of build_surface, and the cuts.
         bones: whose skin it borrows weights from.
@@ -58,7 +57,6 @@ class GarmentTemplate:
     """
 
     name: str
-    description: str
     measures: Measures
     outline: Callable[[Body, Measures], Outline]
     bones: Sequence[str] = SHIRT_BONES
@@ -158,43 +156,43 @@ def _legs(body: Body, cut: Measures) -> Outline:
 
 GARMENT_TEMPLATES = (
     GarmentTemplate(
-        name=TSHIRT, description="T-shirt", outline=_sleeves,
+        name=TSHIRT, outline=_sleeves,
         measures={"ease": 0.06, "clearance": 0.015, "sleeve": 0.55, "length": 0.09},
     ),
     GarmentTemplate(  # its hem swings freely
-        name="tunic", description="flared tunic", outline=_sleeves,
+        name="tunic", outline=_sleeves,
         measures={"ease": 0.06, "clearance": 0.015, "sleeve": 0.55, "length": 0.17, "flare": 0.045},
     ),
     GarmentTemplate(
-        name="skirt", description="flared skirt", outline=_skirt,
+        name="skirt", outline=_skirt,
         measures={"ease": 0.04, "clearance": 0.006, "rise": 0.17, "length": 0.3, "flare": 0.1},
         bones=SKIRT_BONES, smoothing=SKIRT_SMOOTHING,
         ranges={"length": (0.1, 0.35, " m")},  # above, its hem would come to where its flare begins
     ),
     GarmentTemplate(
-        name="tank_top", description="tank top", outline=_armholes,
+        name="tank_top", outline=_armholes,
         measures={"ease": 0.06, "clearance": 0.015, "strap": 0.06, "length": 0.09},
     ),
     GarmentTemplate(
-        name="long_sleeves", description="shirt with long sleeves",
+        name="long_sleeves",
         outline=partial(_sleeves, end="left_wrist"),
         measures={"ease": 0.06, "clearance": 0.015, "sleeve": 0.9, "length": 0.09},
         bones=LONG_SLEEVE_BONES, ranges={"sleeve": (0.55, 0.95, " of the arm")},
     ),
     GarmentTemplate(
-        name="trousers", description="trousers", outline=_legs,
+        name="trousers", outline=_legs,
         measures={"ease": 0.04, "clearance": 0.006, "rise": 0.17, "length": 0.9},
         bones=TROUSER_BONES, smoothing=TROUSER_SMOOTHING,
         ranges={"length": (0.6, 0.95, " of the inner leg")},
     ),
     GarmentTemplate(
-        name="shorts", description="shorts", outline=_legs,
+        name="shorts", outline=_legs,
         measures={"ease": 0.06, "clearance": 0.006, "rise": 0.17, "length": 0.25},
         bones=TROUSER_BONES, smoothing=TROUSER_SMOOTHING,
         ranges={"length": (0.15, 0.5, " of the inner leg")},
     ),
     GarmentTemplate(  # to above the knee; its lower part follows both thighs
-        name="dress", description="dress", outline=_armholes,
+        name="dress", outline=_armholes,
         measures={"ease": 0.06, "clearance": 0.015, "strap": 0.06, "length": 0.32, "flare": 0.1},
         smoothing=SKIRT_SMOOTHING, ranges={"length": (0.2, 0.6, " m")},
     ),
@@ -207,8 +205,8 @@ def find_template(name: str) -> GarmentTemplate:
     Raises:
         GarmentError: another name; the message lists the known ones.
 
-    >>> find_template("tank_top").description
-    'tank top'
+    >>> find_template("tank_top").measures["strap"]  # [m]
+    0.06
     """
     for template in GARMENT_TEMPLATES:
         if template.name == name:
