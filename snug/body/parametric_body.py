@@ -61,7 +61,10 @@ class Body:
         >>> round(Body.load().height, 2)  # [m]
         1.69
         """
-        arrays = {key: _widened(stored) for key, stored in read_arrays(BODY_FILE).items()}
+        arrays = {
+            key: stored.astype(np.float64 if stored.dtype.kind == "f" else np.int64)
+            for key, stored in read_arrays(BODY_FILE).items()
+        }
         # float32 in the file: make the rows sum to one again in float64.
         arrays["skinning_weights"] /= arrays["skinning_weights"].sum(axis=1, keepdims=True)
         return Body(**arrays)
@@ -182,7 +185,3 @@ class Body:
         if betas.shape != (self.shape_count,) or not np.isfinite(betas).all():
             raise BodyError(f"betas of shape {betas.shape}: expected {self.shape_count} finite numbers")
         return betas
-
-
-def _widened(array: np.ndarray) -> np.ndarray:
-    return array.astype(np.float64 if array.dtype.kind == "f" else np.int64)

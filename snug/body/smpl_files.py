@@ -30,7 +30,6 @@ from snug.body.skeleton import BODY_JOINTS, JOINT, JOINT_NAMES, PARENTS, BodyErr
 
 JOINTS = len(JOINT_NAMES)
 FOLDED = {20: JOINT["left_hand"], 21: JOINT["right_hand"], 15: 15}  # what hangs on wrists and head
-MAX_VERTICES = 100_000
 MAX_HOLE = 0.15  # [m] around: an eye of SMPL-X is closed, a missing foot is not
 T_POSE = np.radians(10.0)  # up to which arms may hang down
 
@@ -95,9 +94,8 @@ def _numbers(arrays: Arrays, key: str, shape: tuple[int | None, ...]) -> np.ndar
         wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
         raise BodyError(f"{key} is {array.dtype} {array.shape}; expected numbers of shape {wanted}")
     array = array.astype(np.float64)
-    if len(bad := np.argwhere(~np.isfinite(array))):
-        first, place = array[tuple(bad[0])], ", ".join(map(str, bad[0]))
-        raise BodyError(f"{key}[{place}] is {first}: not finite, as are {len(bad)} of its values")
+    if bad := np.count_nonzero(~np.isfinite(array)):
+        raise BodyError(f"{key} has {bad} values that are not finite")
     return array
 
 
@@ -105,8 +103,6 @@ def _make_body(arrays: Arrays) -> Body:
     """Make the body. Raises BodyError."""
     template = _numbers(arrays, "v_template", (None, 3))
     count = len(template)
-    if count > MAX_VERTICES:
-        raise BodyError(f"v_template has {count} vertices; at most {MAX_VERTICES} are read")
     weights, places, folded = _skeleton(arrays, count)
     directions = np.zeros((count, 3, 0))
     if "shapedirs" in arrays:
@@ -145,27 +141,21 @@ def _skeleton(arrays: Arrays, count: int) -> tuple[np.ndarray, np.ndarray, np.nd
     sums = weights.sum(axis=1, keepdims=True)
     if weights.min() < -1e-6 or np.abs(sums - 1.0).max() > 1e-3:
         raise BodyError("weights must be non-negative with rows that sum to one")
-    kept = JOINTS if joints == JOINTS else BODY_JOINTS
-    wrong = [j for j in range(1, kept) if parents[j] != PARENTS[j]]
-    if wrong:
-        difference = f"joint {wrong[0]} hangs on {parents[wrong[0]]}, expected {PARENTS[wrong[0]]}"
-        raise BodyError(f"kintree_table is not SMPL's: the parent of each joint; {difference}")
-    if joints == JOINTS:
-        return weights / sums, np.eye(JOINTS), np.eye(JOINTS)
-    places, folded = np.zeros((JOINTS, joints)), np.zeros((joints, JOINTS))
-    places[:kept, :kept] = folded[:kept, :kept] = np.eye(kept)
-    for joint in range(kept, joints):
-        parent = int(parents[joint])
-        if not (parent in FOLDED or kept <= parent < joint):
-            raise BodyError(f"kintree_table: joint {joint} hangs on {parent}; expected head, hand, finger")
-        if parent in FOLDED:
+    for joint in range(1, joints):
+        known = (PARENTS[joint],) if joint < BODY_JOINTS else (*FOLDED, *range(BODY_JOINTS, joint))
+        if parents[joint] not in known:
+            raise BodyError(f"the tree of joints is not SMPL's: joint {joint} hangs on {parents[joint]}")
+    places, folded = np.eye(JOINTS, joints), np.eye(joints, JOINTS)
+    places[BODY_JOINTS:], folded[BODY_JOINTS:] = 0.0, 0.0
+    for joint in range(BODY_JOINTS, joints):
+        if (parent := int(parents[joint])) in FOLDED:
             folded[joint, FOLDED[parent]] = 1.0
             places[FOLDED[parent], joint] = parent != FOLDED[parent]  # knuckles; the head stays where it is
         else:
             folded[joint] = folded[parent]
     knuckles = places.sum(axis=1, keepdims=True)
     if knuckles.min() == 0:
-        raise BodyError("kintree_table: a wrist without a finger")
+        raise BodyError("the tree of joints has a wrist without a finger")
     return weights / sums, places / knuckles, folded
 
 

@@ -131,7 +131,7 @@ def moved_joint(regressor):
     [
         (lambda a: {k: v for k, v in a.items() if k != "weights"}, "no array weights or blend_weights"),
         (changed("weights", lambda w: 2 * w), "sum to one"),
-        (changed("v_template", lambda v: np.where(v == v[7, 1], np.nan, v)), "v_template[7, 1] is nan"),
+        (changed("v_template", lambda v: np.where(v == v[7, 1], np.nan, v)), "v_template has"),
         (changed("v_template", lambda v: v * 1000), "in metres"),
         (changed("v_template", lambda v: v[:, [0, 2, 1]] * [1, 1, -1]), "in metres"),
         (changed("v_template", lambda v: v * [-1, 1, -1]), "face +z"),

@@ -1,7 +1,5 @@
 """Tailored garments: topology, even triangles, room around the body, ease, flare, borrowed weights."""
 
-import dataclasses
-
 import igl
 import numpy as np
 import pytest
@@ -255,14 +253,6 @@ def test_a_dress_follows_both_thighs_below_and_the_skin_above(body, wardrobe):
 def test_every_kind_of_cut_fits_another_mesh(another, kind):
     garment = find_template(kind).tailor(another, vertices=500)
     assert set(garment.loops) == OPENINGS[kind]
-
-
-def test_a_body_too_large_for_the_grid_is_refused_at_once(body):
-    joints = body.joint_template.copy()
-    joints[body.joint_names.index("left_elbow"), 0] = 1e6
-    with pytest.raises(GarmentError, match="metres") as caught:
-        find_template("tshirt").tailor(dataclasses.replace(body, joint_template=joints))
-    assert "\n" not in str(caught.value)
 
 
 @pytest.mark.slow
