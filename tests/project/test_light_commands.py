@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import resource
 import subprocess
 import sys
 from pathlib import Path
@@ -38,16 +37,12 @@ LIGHT = [
 
 @pytest.mark.parametrize(("command", "answer", "heavy"), LIGHT)
 def test_nothing_heavy_is_loaded_before_there_is_something_to_do(command, answer, heavy, tmp_path):
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     done = subprocess.run(
         [sys.executable, "-c", PROBE, *command.split()],
         capture_output=True, text=True, timeout=120, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)},
     )  # fmt: skip
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)  # of the processor: others may have the machine
     assert done.returncode == 0 and done.stderr == "", done.stderr
     output, _, modules = done.stdout.rpartition("LOADED")
     loaded = set(modules.split())
     assert answer in output and "runpy" in loaded and loaded.isdisjoint(heavy), loaded & heavy
     assert list(tmp_path.iterdir()) == []
-    if not command.endswith("--dry-run"):  # which reads clips
-        assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 1.0
