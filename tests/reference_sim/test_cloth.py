@@ -16,7 +16,6 @@ KITE_FACES = np.array([(0, 1, 2), (1, 0, 3)])
 
 def test_two_triangles_by_hand():
     cloth = Cloth(KITE, KITE_FACES, Material(thickness=0.5, density=4.0))
-    assert cloth.vertex_count == 4
     assert cloth.areas == pytest.approx([1.0, 3.0], rel=1e-15)
     assert cloth.edges.tolist() == [[0, 1], [0, 2], [0, 3], [1, 2], [1, 3]]
     assert cloth.edge_lengths == pytest.approx([2, 2**0.5, 10**0.5, 2**0.5, 10**0.5], rel=1e-15)
@@ -33,24 +32,19 @@ def test_rest_uv_replaces_the_rest_state_of_everything_but_the_start():
     cloth = Cloth(x, faces, rest_uv=2 * x[:, [2, 0]])
     plain = Cloth(x, faces)
     assert cloth.areas == pytest.approx(4 * plain.areas, rel=1e-15)
-    assert cloth.masses == pytest.approx(4 * plain.masses, rel=1e-15)
     assert cloth.edge_lengths == pytest.approx(2 * plain.edge_lengths, rel=1e-15)
-    assert cloth.hinge_lengths == pytest.approx(2 * plain.hinge_lengths, rel=1e-15)
     assert cloth.hinge_areas == pytest.approx(4 * plain.hinge_areas, rel=1e-15)
     assert (cloth.rest_positions == x).all()
 
 
 def test_a_cloth_keeps_its_rest_state_when_the_callers_arrays_change():
     x, faces = grid(2, 2)
-    uv = x[:, [0, 2]].copy()
-    cloth, plain = Cloth(x, faces, rest_uv=uv), Cloth(x.copy(), faces.copy())
-    x += 1.0
-    uv *= 2.0
-    faces[:] = 0
-    assert (cloth.rest_positions == plain.rest_positions).all() and (cloth.faces == plain.faces).all()
-    assert cloth.areas == pytest.approx(plain.areas) and cloth.edge_lengths == pytest.approx(
-        plain.edge_lengths
-    )
+    given = [x.copy(), faces.copy(), x[:, [0, 2]].copy()]
+    cloth = Cloth(*given[:2], rest_uv=given[2])
+    for array in given:
+        array[:] = 0
+    assert (cloth.rest_positions == x).all() and (cloth.faces == faces).all()
+    assert cloth.areas == pytest.approx(Cloth(x, faces).areas)
 
 
 def moved(index: int, to: tuple[float, float, float]) -> np.ndarray:
@@ -80,10 +74,8 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(
-    ("x", "faces", "more", "message"), [case[1:] for case in REFUSED], ids=[case[0] for case in REFUSED]
-)
-def test_a_mesh_that_cannot_be_simulated_is_refused_by_name(x, faces, more, message):
+@pytest.mark.parametrize(("what", "x", "faces", "more", "message"), REFUSED)
+def test_a_mesh_that_cannot_be_simulated_is_refused_by_name(what, x, faces, more, message):
     with pytest.raises(ValueError, match=re.escape(message)) as refused:  # as callers catch it
         Cloth(x, faces, **more)
     assert refused.type is MeshError

@@ -17,21 +17,16 @@ def hinge_at(phi: float) -> np.ndarray:
     return np.array([(0, 0, 0), (1, 0, 0), (0.3, 1, 0), (0.6, -np.cos(phi), -np.sin(phi))])
 
 
-def one_hinge(rest: float) -> BendHinge:
-    # The edge has length 1 and each face half a square metre: scaled by 1/4, k is 2 J.
-    cloth = Cloth(hinge_at(0.0), np.array([(0, 1, 2), (1, 0, 3)]), Material(bending_stiffness=8.0))
-    return BendHinge(cloth, rest_angles=rest)
-
-
-@pytest.mark.parametrize("phi", [2.9, 3.1, np.pi - 1e-7, np.pi + 1e-7, 3.2, 3.4])
+@pytest.mark.parametrize("phi", [2.9, np.pi - 1e-7, np.pi + 1e-7, 3.4])
 @pytest.mark.parametrize("rest", [3.0, -3.0, 0.0])
 def test_a_hinge_passes_through_half_a_turn(phi, rest):
     """Across phi = pi atan2 jumps by a full turn; energy, torque and stiffness must not notice.
 
     The energy takes the shorter way round to the rest angle, so only the point opposite to it is a kink.
     """
-    energy = one_hinge(rest)
-    x = hinge_at(phi)
+    # The edge has length 1 and each face half a square metre: scaled by 1/4, k is 2 J.
+    cloth = Cloth(hinge_at(0.0), np.array([(0, 1, 2), (1, 0, 3)]), Material(bending_stiffness=8.0))
+    energy, x = BendHinge(cloth, rest_angles=rest), hinge_at(phi)
     way = (phi - rest + np.pi) % (2 * np.pi) - np.pi
     value, gradient = energy.value_and_gradient(x)
     assert value == pytest.approx(way**2, rel=1e-12)
