@@ -149,7 +149,9 @@ class ScalarPattern:
         self.row_columns = np.ascontiguousarray(moved[rows, 0])
         self.row_starts = np.searchsorted(moved[rows, 1], np.arange(count + 1))
         self.factor_rows, self.factor_columns = _pattern_of_rows(self.row_starts, self.row_columns)
-        self.starts, self.rows = _by_columns(self.factor_rows, self.factor_columns)
+        by_rows = (np.ones(len(self.factor_columns)), self.factor_columns, self.factor_rows)
+        by_columns = sp.csr_matrix(by_rows, shape=(count, count)).tocsc()
+        self.starts, self.rows = by_columns.indptr.astype(np.int64), by_columns.indices
         # A signed index is first asked whether it counts from the end: a quarter of a factorisation's time.
         self.row_columns, self.factor_columns, self.rows = (
             columns.astype(np.uint32) for columns in (self.row_columns, self.factor_columns, self.rows)
@@ -207,22 +209,6 @@ def _row_patterns(starts, columns, row, out):
                 else:
                     row[k + 1] += 1
                 i = parent[i]
-
-
-@njit(cache=True)
-def _by_columns(factor_rows, factor_columns):
-    count = len(factor_rows) - 1
-    starts = np.zeros(count + 1, np.int64)
-    for column in factor_columns:
-        starts[column + 1] += 1
-    starts = np.cumsum(starts)
-    place, rows = starts.copy(), np.empty(len(factor_columns), np.int64)
-    for k in range(count):
-        for p in range(factor_rows[k], factor_rows[k + 1]):
-            column = factor_columns[p]
-            rows[place[column]] = k
-            place[column] += 1
-    return starts, rows
 
 
 @njit(cache=True, error_model="numpy")

@@ -29,26 +29,21 @@ class HessianPattern:
     coordinates share.
 
     Args:
-        energies: the terms.
-        vertex_count: V.
         free: (V,) True for vertices that take part.
         block: 3 or 1.
 
     Attributes:
         free: (n,) indices of the free vertices, in the order of the matrix.
-        block: 3 or 1.
         indptr, indices: CSC structure of the (block n, block n) lower matrix.
         order: fill-reducing order of its rows and columns.
         diagonal: places of the diagonal entries in the values.
     """
 
-    def __init__(
-        self, energies: Sequence[Energy], vertex_count: int, free: np.ndarray, *, block: int = 3
-    ) -> None:
+    def __init__(self, energies: Sequence[Energy], free: np.ndarray, *, block: int = 3) -> None:
         self.block = block
         self.energies = tuple(energies)
         self.free = np.flatnonzero(free)
-        number = np.full(vertex_count, -1, dtype=np.int64)
+        number = np.full(len(free), -1, dtype=np.int64)
         number[self.free] = np.arange(len(self.free))
         n = len(self.free)
         of_terms = [_block_keys(number[energy.stencils], n) for energy in energies]
@@ -96,17 +91,14 @@ class HessianPattern:
         if not len(np.setdiff1d(needed, self._key, assume_unique=True)):
             return self
         kept = np.setdiff1d(self._key, self._fixed._key, assume_unique=True)
-        return self._fixed._widened(
-            np.union1d(kept, needed) if len(kept) < SPARE_BLOCKS * len(needed) else needed
-        )
-
-    def _widened(self, extra: np.ndarray) -> HessianPattern:
-        wider = copy.copy(self)
+        if len(kept) < SPARE_BLOCKS * len(needed):
+            needed = np.union1d(kept, needed)
+        wider = copy.copy(self._fixed)
         for cached in ("order", "_constant"):
             wider.__dict__.pop(cached, None)
-        key = np.union1d(self._key, extra)
-        moved = np.append(np.searchsorted(key, self._key), -1)  # slot -1, not stored, stays -1
-        wider._slots = [moved[slots] for slots in self._slots]
+        key = np.union1d(self._fixed._key, needed)
+        moved = np.append(np.searchsorted(key, self._fixed._key), -1)  # slot -1, not stored, stays -1
+        wider._slots = [moved[slots] for slots in self._fixed._slots]
         wider._lay_out(key)
         return wider
 
@@ -314,5 +306,5 @@ class Potential:
         key = (np.packbits(free).tobytes(), block)
         if key not in self._patterns:
             terms = [e for e in self.energies if block == 3 or e.has_scalar_stiffness]
-            self._patterns[key] = HessianPattern(terms, self.cloth.vertex_count, free, block=block)
+            self._patterns[key] = HessianPattern(terms, free, block=block)
         return self._patterns[key]

@@ -1,15 +1,13 @@
 """Trajectory: positions over time, whether and how they converged, and its files.
 
 The file is VTKHDF (temporal PolyData), so ParaView opens it as it is; what VTK has no place for lies in the
-top-level group /benchmark. Blender's Mesh Cache modifier reads a point cache, PC2: a 32-byte header
-(signature, version 1, number of points, first frame, frames per sample, number of samples), then float32
-positions, sample by sample. PC16 is the same in float16.
+top-level group /benchmark. Blender's Mesh Cache modifier reads a point cache, PC2: a header, then
+float32 positions, sample by sample. PC16 is the same in float16.
 """
 
 from __future__ import annotations
 
 import json
-import struct
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -196,7 +194,9 @@ def _write_vtk(file: h5py.File, trajectory: Trajectory) -> None:
 
 
 SIGNATURE = b"POINTCACHE2\0"
-HEADER_SIZE = len(SIGNATURE) + 20
+# Signature, version, number of points, first frame, frames a sample, number of samples.
+HEADER = np.dtype("S12, <i4, <i4, <f4, <f4, <i4")
+HEADER_SIZE = HEADER.itemsize
 TYPES = {".pc2": "<f4", ".pc16": "<f2"}
 
 
@@ -220,7 +220,7 @@ def write_point_cache(path: str | Path, trajectory: Trajectory) -> tuple[Path, P
         raise ValueError(f"{path}: a point cache ends in .pc2")
     mesh = path.with_suffix(".obj")
     frames, points, _ = trajectory.positions.shape
-    header = SIGNATURE + struct.pack("<iiffi", 1, points, 0.0, 1.0, frames)
+    header = np.array((SIGNATURE, 1, points, 0.0, 1.0, frames), HEADER).tobytes()
     with replacing(path) as temporary:
         temporary.write_bytes(header + trajectory.positions.astype("<f4").tobytes())
     write_obj(mesh, trajectory.positions[0], trajectory.faces)
@@ -258,15 +258,13 @@ def read_point_cache(path: str | Path) -> np.ndarray:
     if path.suffix.lower() not in TYPES:
         raise TrajectoryError(f"{path}: a point cache is named {' or '.join(TYPES)}")
     kind, length = np.dtype(TYPES[path.suffix.lower()]), path.stat().st_size
-    with path.open("rb") as file:
-        header = file.read(HEADER_SIZE)
-        if len(header) < HEADER_SIZE or not header.startswith(SIGNATURE):
-            raise TrajectoryError(f"{path}: is no point cache: it does not begin with POINTCACHE2")
-        version, points, _, _, frames = struct.unpack("<iiffi", header[len(SIGNATURE) :])
-        declared = HEADER_SIZE + frames * points * 3 * kind.itemsize
-        if version != 1 or points < 1 or frames < 1 or declared != length:
-            raise TrajectoryError(
-                f"{path}: version {version}, {frames} samples of {points} points take {declared} bytes, the "
-                f"file has {length}: write it again"
-            )
-        return np.fromfile(file, kind).reshape(frames, points, 3)
+    if length < HEADER_SIZE:
+        raise TrajectoryError(f"{path}: is shorter than the header of a point cache")
+    signature, version, points, _, _, frames = np.fromfile(path, HEADER, 1)[0].tolist()
+    declared = HEADER_SIZE + frames * points * 3 * kind.itemsize
+    if (signature, version) != (SIGNATURE[:-1], 1) or min(points, frames) < 1 or declared != length:
+        raise TrajectoryError(
+            f"{path}: {signature!r} of version {version}, {frames} samples of {points} points take "
+            f"{declared} bytes, the file has {length}: write it again"
+        )
+    return np.fromfile(path, kind, offset=HEADER_SIZE).reshape(frames, points, 3)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reference_sim.cloth import Cloth
-from reference_sim.energies.energy import Energy, demand_not_negative, demand_positive
+from reference_sim.energies.energy import Energy, demand_positive
 from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
@@ -30,7 +30,7 @@ class AreaBarrier(Energy):
     name = "area_barrier"
 
     def __init__(self, cloth: Cloth, *, stiffness: float = 100.0, threshold: float = 0.1) -> None:
-        demand_not_negative("AreaBarrier", stiffness=stiffness)
+        demand_positive("AreaBarrier", or_zero=True, stiffness=stiffness)
         demand_positive("AreaBarrier", threshold=threshold)
         self.cloth = cloth
         self.stencils = cloth.faces

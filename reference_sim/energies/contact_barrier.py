@@ -29,7 +29,6 @@ from reference_sim.energies.energy import Energy, Step, demand_positive
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
-    from torch import Tensor
 
 DEFAULT_DISTANCE = 2e-3  # [m]
 DEFAULT_STIFFNESS = 1e2  # [Pa]; measured: a tenth of it saves nothing, a hundred times it doubles Newton
@@ -81,13 +80,6 @@ class ContactBarrier(Energy):
             "stiffness_Pa": self.stiffness,
             "package": f"ipctk {self.package.__version__}",
         }
-
-    def energy(self, x: Tensor) -> Tensor:
-        """Raise NotImplementedError: the definition is that of ipctk."""
-        raise NotImplementedError(
-            "ContactBarrier has no definition in torch, its energy is ipctk's: call value_and_gradient(x), "
-            "or train with ContactPenalty"
-        )
 
     def prepare(self, step: Step) -> None:
         """Keep nothing from the step before, so that sums over pairs have one order."""

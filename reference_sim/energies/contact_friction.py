@@ -20,7 +20,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reference_sim.energies.contact_penalty import ContactPenalty
-from reference_sim.energies.energy import Energy, Step, demand_not_negative, demand_positive
+from reference_sim.energies.energy import Energy, Step, demand_positive
 from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
@@ -46,7 +46,7 @@ class ContactFriction(Energy):
     remembers = True
 
     def __init__(self, contact: ContactPenalty, *, coefficient: float = 0.5, speed: float = 0.02) -> None:
-        demand_not_negative("ContactFriction", coefficient=coefficient)
+        demand_positive("ContactFriction", or_zero=True, coefficient=coefficient)
         demand_positive("ContactFriction", speed=speed)
         self.cloth = contact.cloth
         self.contact = contact

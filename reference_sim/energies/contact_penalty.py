@@ -20,7 +20,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from reference_sim.cloth import Cloth
-from reference_sim.energies.energy import Energy, Step, demand_not_negative
+from reference_sim.energies.energy import Energy, Step, demand_positive
 from reference_sim.geometry.closest_point import halved
 from reference_sim.kernels.fast_kernels import Constraints, VertexBlocks
 from reference_sim.kernels.kernel_cache import njit
@@ -246,8 +246,8 @@ class ContactPenalty(Energy):
     ) -> None:
         if samples not in ("all", "vertices"):
             raise ValueError(f"ContactPenalty samples {samples!r}: choose 'all' or 'vertices'")
-        demand_not_negative("ContactPenalty", stiffness=stiffness, margin=margin)
-        demand_not_negative("ContactPenalty", per_sample_stiffness=per_sample_stiffness or 0.0)
+        demand_positive("ContactPenalty", or_zero=True, stiffness=stiffness, margin=margin)
+        demand_positive("ContactPenalty", or_zero=True, per_sample_stiffness=per_sample_stiffness or 0.0)
         self.cloth = cloth
         self.samples = samples
         self.margin = float(margin)

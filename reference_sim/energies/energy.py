@@ -46,23 +46,12 @@ DERIVATIVES = (
 )  # fmt: skip
 
 
-def _inherits(cls: type[Energy], name: str) -> bool:
-    """Return whether a class has a closed form from a parent."""
-    return getattr(cls, name) is not getattr(Energy, name)
-
-
-def demand_not_negative(what: str, **numbers: float) -> None:
-    """Raise ValueError unless all numbers are finite and at least 0; `what` names the term in the message."""
-    for name, value in numbers.items():
-        if not (np.isfinite(value) and value >= 0):
-            raise ValueError(f"{what} {name} = {value!r}: must be finite and not negative")
-
-
-def demand_positive(what: str, **numbers: float) -> None:
+def demand_positive(what: str, *, or_zero: bool = False, **numbers: float) -> None:
     """Raise ValueError unless all numbers are finite and above 0; `what` names the term in the message."""
     for name, value in numbers.items():
-        if not (np.isfinite(value) and value > 0):
-            raise ValueError(f"{what} {name} = {value!r}: must be a finite number above 0")
+        if not (np.isfinite(value) and (value > 0 or (or_zero and value == 0))):
+            least = "at least 0" if or_zero else "above 0"
+            raise ValueError(f"{what} {name} = {value!r}: must be a finite number {least}")
 
 
 class Energy:
@@ -103,8 +92,8 @@ class Energy:
         own = vars(cls)
         if {"element_energy", "power"}.isdisjoint(own):
             return
-        foreign = [name for name in DERIVATIVES if name not in own and _inherits(cls, name)]
-        if foreign:
+        inherited = [name for name in DERIVATIVES if name not in own]
+        if foreign := [name for name in inherited if getattr(cls, name) is not getattr(Energy, name)]:
             lines = "; ".join(f"{name} = Energy.{name}" for name in foreign)
             raise TypeError(f"{cls.__name__} would inherit closed forms of another energy: write {lines}")
 

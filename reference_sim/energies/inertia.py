@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from reference_sim.cloth import Cloth
-from reference_sim.energies.energy import Energy, Step
+from reference_sim.energies.energy import Energy, Step, demand_positive
 from reference_sim.kernels.fast_kernels import TRAINING_LANES, BatchKernel
 
 if TYPE_CHECKING:
@@ -30,8 +30,7 @@ class Inertia(Energy):
     kernels: ClassVar = {"vertex_inertia": vertex_inertia}
 
     def __init__(self, cloth: Cloth, dt: float) -> None:
-        if not (np.isfinite(dt) and dt > 0):
-            raise ValueError(f"Inertia dt = {dt!r}: must be a finite number of seconds above 0")
+        demand_positive("Inertia", dt=dt)
         self.cloth = cloth
         self.stencils = np.arange(cloth.vertex_count)[:, None]
         self.dt = float(dt)

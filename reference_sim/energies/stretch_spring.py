@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reference_sim.cloth import Cloth
-from reference_sim.energies.energy import Energy, demand_not_negative
+from reference_sim.energies.energy import Energy, demand_positive
 from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
@@ -24,7 +24,7 @@ class StretchSpring(Energy):
     constant = (1,)
 
     def __init__(self, cloth: Cloth, *, stiffness: float = 15.0) -> None:
-        demand_not_negative("StretchSpring", stiffness=stiffness)
+        demand_positive("StretchSpring", or_zero=True, stiffness=stiffness)
         self.cloth = cloth
         self.stencils = cloth.edges
         self.rest_lengths = cloth.edge_lengths

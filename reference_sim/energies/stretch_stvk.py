@@ -185,11 +185,8 @@ def _less_compressed(stress, keep):
         # S = mean I + radius R with a reflection R; at radius 0 any R will do.
         scale = 0.5 * (high - low) / radius if radius > 0.0 else 0.0
         mean = 0.5 * (high + low)
-        reduced[f, 0], reduced[f, 1], reduced[f, 2] = (
-            mean + scale * half,
-            mean - scale * half,
-            scale * stress[f, 2],
-        )
+        reduced[f, 0], reduced[f, 1] = mean + scale * half, mean - scale * half
+        reduced[f, 2] = scale * stress[f, 2]
     return reduced
 
 

@@ -149,22 +149,21 @@ def _surface(
     if corners.max() > 4 or corners.min() < 3:
         k = int(np.argmax((corners > 4) | (corners < 3)))
         raise MeshError(f"{path}: face {k} has {corners[k]} corners: triangulate the mesh")
-    faces = np.array(_halved(polygons), dtype=np.int64)
-    bad = np.flatnonzero((faces < 0).any(axis=1) | (faces >= len(positions)).any(axis=1))
-    if bad.size:
-        raise MeshError(f"{path}: triangle {bad[0]} names a vertex beyond the {len(positions)} there are")
-    places = np.array(_halved(uv_polygons), np.int64)
+    faces = _triangles(path, polygons, range(len(positions)), "vertex")
+    places = _triangles(path, uv_polygons, range(-1, len(uv)), "texture coordinate")
     if (places < 0).all():
         return Surface(positions, faces)
-    bad = np.flatnonzero((places >= len(uv)).any(axis=1) | (places < -1).any(axis=1))
-    if bad.size:
-        raise MeshError(f"{path}: triangle {bad[0]} names a texture coordinate beyond the {len(uv)}")
     return Surface(positions, faces, np.where(places[..., None] < 0, np.nan, uv[places]))
 
 
-def _halved(polygons: Sequence[Any]) -> list[tuple[int, int, int]]:
-    """Cut quads into triangles; triangles stay."""
-    return [half for p in polygons for half in ((p[0], p[1], p[2]), (p[0], p[2], p[-1]))[: len(p) - 2]]
+def _triangles(path: Path, polygons: Sequence[Any], known: range, what: str) -> np.ndarray:
+    """Cut quads into triangles (F, 3). Raises MeshError for one that names what is not known."""
+    halves = [half for p in polygons for half in ((p[0], p[1], p[2]), (p[0], p[2], p[-1]))[: len(p) - 2]]
+    triangles = np.array(halves, np.int64).reshape(-1, 3)
+    bad = np.flatnonzero(((triangles < known.start) | (triangles >= known.stop)).any(axis=1))
+    if bad.size:
+        raise MeshError(f"{path}: triangle {bad[0]} names a {what} beyond the {known.stop} there are")
+    return triangles
 
 
 def read_sequence(pattern: str | Path) -> tuple[np.ndarray, Surface]:
@@ -209,19 +208,14 @@ def _paths(pattern: str) -> list[Path]:
     path = Path(pattern)
     if path.is_dir():
         paths = [p for p in path.iterdir() if p.suffix.lower() in MESH_SUFFIXES]
-        if not paths:
-            raise MeshError(f"{path}: no mesh in this folder ({', '.join(MESH_SUFFIXES)})")
     elif path.exists() or not glob.has_magic(pattern):
         paths = [path]
     else:
         paths = [Path(name) for name in glob.glob(pattern)]
-        if not paths:
-            raise MeshError(f"{pattern}: no file matches (quote the pattern, or the shell expands it)")
     kinds = sorted({p.suffix.lower() for p in paths})
-    if len(kinds) > 1:
-        raise MeshError(
-            f"{pattern}: meshes of several kinds ({', '.join(kinds)}): name one, as in '*{kinds[0]}'"
-        )
+    if len(kinds) != 1:
+        held = f"meshes of several kinds ({', '.join(kinds)})" if kinds else "no mesh"
+        raise MeshError(f"{pattern}: {held}: quote a pattern of one kind, as 'body_*.ply'")
     return sorted(paths, key=lambda p: [int(s) if s.isdigit() else s for s in re.split(r"(\d+)", str(p))])
 
 

@@ -91,11 +91,8 @@ def _search_groups(some, points, samples, exact, mesh, pose, faces, barycentric,
     x, x32 = np.empty((LANES, 3)), np.empty((3, LANES), np.float32)
     best, scale, useful = np.empty(LANES), np.empty(LANES), np.empty(LANES, np.float32)
     answer, weights = np.empty(LANES, np.int64), np.empty((LANES, 2))
-    apart, hits, out = (
-        np.empty(LANES, np.float32),
-        np.empty(LANES, np.int64),
-        np.empty(LANES * LANES, np.float32),
-    )
+    apart, hits = np.empty(LANES, np.float32), np.empty(LANES, np.int64)
+    out = np.empty(LANES * LANES, np.float32)
     leaves, bounds = np.empty(LANES * len(boxes), np.int64), np.empty(LANES * len(boxes), np.float32)
     limited, missing = limit < np.inf, 0
     for first in range(0, len(some), LANES):

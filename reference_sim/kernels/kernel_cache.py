@@ -89,11 +89,6 @@ def _locator_in_use() -> Iterator[None]:
         _config.CACHE_LOCATOR_CLASSES = given
 
 
-def source_digest(function: Any) -> str:
-    """Return the digest of the source of a kernel's function, and of what it takes from other files."""
-    return _digests.get(function.__module__) or _digest(function)
-
-
 def _digest(function: Any) -> str:
     """Return the digest of the file of a module's first kernel, with kernels and constants imported above."""
     digest = hashlib.blake2b(Path(function.__code__.co_filename).read_bytes(), digest_size=8)
@@ -127,7 +122,7 @@ def _folder(function: Any, digest: str) -> Path | None:
 def kernel_argument(kernel: Dispatcher) -> np.ndarray:
     """Return what stands for a kernel of `kernel_cache.njit` among the arguments of another one."""
     function = kernel.py_func
-    name = f"{function.__module__}:{function.__qualname__}@{source_digest(function)}"
+    name = f"{function.__module__}:{function.__qualname__}@{_digests[function.__module__]}"
     return np.zeros(1, np.dtype([(name, np.int8)]))
 
 

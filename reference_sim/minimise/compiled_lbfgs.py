@@ -162,9 +162,8 @@ def descend(
             continue
         if counts[0] == 0:
             counts[1] = share
-        for i in range(
-            len(u)
-        ):  # the direction has done its work: it becomes the step, the gradient its change
+        # The direction has done its work: it becomes the step, the gradient its change.
+        for i in range(len(u)):
             p[i] = trial[i] - u[i]
             gradient[i] = trial_gradient[i] - gradient[i]
         curvature = dot(p, gradient)

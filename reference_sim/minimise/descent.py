@@ -66,9 +66,7 @@ SUM_MATH = {"reassoc", "contract", "nsz"}  # sums in vector instructions
 
 
 @njit(cache=True, fastmath=SUM_MATH)
-def first_loop(
-    pairs: np.ndarray, curvatures: np.ndarray, order: np.ndarray, q: np.ndarray, alphas: np.ndarray
-) -> None:
+def first_loop(pairs, curvatures, order, q, alphas):
     """Run from the newest pair to the oldest: set alphas (k,); q (3n,) is then ready for the first guess."""
     for k in range(len(order) - 1, -1, -1):
         s, y, total = pairs[order[k], 0], pairs[order[k], 1], 0.0
@@ -80,9 +78,7 @@ def first_loop(
 
 
 @njit(cache=True, fastmath=SUM_MATH)
-def second_loop(
-    pairs: np.ndarray, curvatures: np.ndarray, order: np.ndarray, p: np.ndarray, alphas: np.ndarray
-) -> None:
+def second_loop(pairs, curvatures, order, p, alphas):
     """Run from the oldest pair to the newest: p (3n,) becomes the direction."""
     for k in range(len(order)):
         s, y, total = pairs[order[k], 0], pairs[order[k], 1], 0.0
@@ -188,6 +184,11 @@ class Descent:
     def finite(self) -> bool:
         """True if value and gradient are numbers."""
         return bool(np.isfinite(self.value) and np.isfinite(self.g).all())
+
+    def begin(self) -> Stop | None:
+        """Prepare the first step. Returns why there is none, where the start has no energy."""
+        unknown = Stop("diverged", "energy or gradient is not finite at the starting point")
+        return None if self.finite else unknown
 
     def timed(self, part: str, function: Callable[..., Value], *arguments: object) -> Value:
         """Return function(*arguments), and add its seconds to those of `part`."""
@@ -300,19 +301,16 @@ def approximate_wolfe(before: float, after: float, slope: float, end_slope: floa
     return flat and float(end_slope) <= (2 * SUFFICIENT_DECREASE - 1) * slope
 
 
-NOT_FINITE = Stop("diverged", "energy or gradient is not finite at the starting point")
-
-
 def iterate(solver: Any, run: Descent) -> Stop:
     """Minimise from where `run` is; return why that ended.
 
     Args:
-        solver: with limits max_iterations and timeout [s], and three functions of the run that return a Stop
-            to end: init prepares the first step, terminate asks whether the point reached is an answer or no
-            step can lead on from it, step takes one.
+        solver: with limits max_iterations and timeout [s], and two functions of the run that return a Stop
+            to end: terminate asks whether the point reached is an answer or no step can lead on from it, step
+            takes one.
         run: what the minimisation changes.
     """
-    if stop := solver.init(run):
+    if stop := run.begin():
         return stop
     while True:
         # Asked first: on a saddle, terminate takes an iteration and wants the step after it.

@@ -87,14 +87,7 @@ FIRST_ESCAPE = 100  # of the step tolerance: first length of the step along it
 LAST_SHIFT = 1e12  # in units of M/dt^2
 
 
-def convergence_check(
-    run: NewtonRun,
-    values: np.ndarray,
-    *,
-    tolerance: float,
-    step_tolerance: float,
-    round_off: float = 0.0,
-) -> Stop | None:
+def convergence_check(run: NewtonRun, values: np.ndarray, round_off: float) -> Stop | None:
     """Return "converged", "stalled" on a saddle, or None to go on, where the gradient of `run` is small.
 
     Asks whether the true Hessian is positive definite (up to round-off, so that rigid motions of an unpinned
@@ -103,10 +96,9 @@ def convergence_check(
     Args:
         run: the minimisation.
         values: (nnz,) values of its true Hessian.
-        tolerance: relative residual [1]; above it, round-off excuses the residual.
-        step_tolerance: largest Newton step [m] that counts as none.
-        round_off: of the residual [1]; where it is above the tolerance, the reason says so.
+        round_off: of the residual [1]. It excuses a residual above the tolerance, and the reason says so.
     """
+    tolerance, step_tolerance = run.newton.tolerance, run.newton.step_tolerance
     residual = run.gradient_norm()
     relaxed = max(residual, round_off) > tolerance
     why = "gradient within tolerance"

@@ -22,7 +22,6 @@ import numpy as np
 from reference_sim.cholesky import analyse
 from reference_sim.kernels.fast_kernels import terms_without_kernel, warn_slow_path
 from reference_sim.minimise.descent import (
-    NOT_FINITE,
     TOLERANCE,
     Descent,
     LBFGSHistory,
@@ -126,12 +125,6 @@ class LBFGS:
             return run.result(stop)
         return self._newton.minimise(run.x, after=run)
 
-    def init(self, run: LBFGSRun) -> Stop | None:
-        """Factorise the preconditioner at the start, once for all steps."""
-        if not run.finite:
-            return NOT_FINITE
-        return None if run.factorise() else Stop("stalled", "the preconditioner is not positive definite")
-
     def terminate(self, run: LBFGSRun) -> Stop | None:
         """Stop where Newton's method is to take over; nothing but a look at the curvature says converged."""
         if run.gradient_norm() > self.switch:
@@ -171,11 +164,15 @@ class LBFGSRun(Descent):
         self.preconditioner = solver.preconditioner
         self.history = LBFGSHistory(solver.memory)
 
-    def factorise(self) -> bool:
-        """Factorise the preconditioner here; return whether it is positive definite."""
+    def begin(self) -> Stop | None:
+        """Factorise the preconditioner at the start, once for all steps."""
+        if stop := super().begin():
+            return stop
         values = self.timed("assemble", self.preconditioner.assemble, self.x)
         self.factorisations += 1
-        return self.timed("factorise", self.preconditioner.solver.factorise, values)
+        if self.timed("factorise", self.preconditioner.solver.factorise, values):
+            return None
+        return Stop("stalled", "the preconditioner is not positive definite")
 
     def solve(self, q: np.ndarray) -> np.ndarray:
         """Return the inverse of the preconditioner times q (3n,)."""

@@ -25,7 +25,6 @@ from dataclasses import replace
 import numpy as np
 
 from reference_sim.minimise.descent import (
-    NOT_FINITE,
     TOLERANCE,
     Descent,
     LBFGSHistory,
@@ -48,10 +47,8 @@ WATCHDOG_STEPS = 40  # full steps in a row before the energy has to be below its
 PREDICTED = 0.9  # share of the predicted decrease from which on the quadratic model needs no help
 RESIDUAL_ROUND_OFF = 1e-2  # relative residual that round-off may excuse at most
 REUSE_MEMORY = 20  # steps that correct a factorisation used again
-REUSE_WINDOW, REUSE_RATE = (
-    8,
-    0.5,
-)  # it is given up where so many steps do not bring the gradient down to this share
+# It is given up where so many steps do not bring the gradient down to this share.
+REUSE_WINDOW, REUSE_RATE = 8, 0.5
 
 
 class Newton:
@@ -105,10 +102,6 @@ class Newton:
         wrong = self.potential.infeasibility(result.positions)
         return replace(result, status="diverged", reason=wrong) if wrong else result
 
-    def init(self, run: NewtonRun) -> Stop | None:
-        """Ask no more of the start than an energy."""
-        return None if run.finite else NOT_FINITE
-
     def terminate(self, run: NewtonRun) -> Stop | None:
         """Let the true Hessian decide where the gradient is small; otherwise assemble the next step's."""
         spent = run.iterations >= self.max_iterations
@@ -125,23 +118,18 @@ class Newton:
         run.values = run.assemble(CONVEXITY[0 if small else projection])
         if not np.isfinite(run.values).all():
             return Stop("diverged", "the Hessian is not finite")
-        round_off = self.round_off(run)
+        # What round-off of the positions may do to the relative residual.
+        farthest = float(np.abs(run.x).max(initial=0.0))
+        round_off = 8 * np.finfo(float).eps * self.hessian.stiffest(run.values) * farthest / run.weight
         run.target = max(self.tolerance, min(round_off, RESIDUAL_ROUND_OFF))
         if run.gradient_norm() > run.target:
             return None
         self.potential.forget()
         values = run.values if small else run.assemble(0.0)
-        stop = convergence_check(
-            run, values, tolerance=self.tolerance, step_tolerance=self.step_tolerance, round_off=round_off
-        )
+        stop = convergence_check(run, values, round_off)
         if stop is None:
             run.predicting, run.values = False, run.assemble(CONVEXITY[projection])
         return stop
-
-    def round_off(self, run: NewtonRun) -> float:
-        """Return what round-off of the positions may do to the relative residual [1]."""
-        stiffest = self.hessian.stiffest(run.values)
-        return 8 * np.finfo(float).eps * stiffest * float(np.abs(run.x).max(initial=0.0)) / run.weight
 
     def step(self, run: NewtonRun) -> Stop | None:
         """Go on with the last factorisation while it serves, else with the Hessian that was assembled."""
@@ -178,9 +166,8 @@ class NewtonRun(Descent):
 
     def __init__(self, newton: Newton, x: np.ndarray, after: Descent | None) -> None:
         super().__init__(newton.potential, x, after=after)
-        self.hessian = newton.hessian
+        self.newton, self.hessian = newton, newton.hessian
         self.factorised = False  # whether the last factorisation exists, to solve with
-        self.max_iterations, self.timeout = newton.max_iterations, newton.timeout
         self.values, self.target = np.empty(0), newton.tolerance
         self.quasi_newton_steps = self.iterations
         self.history = LBFGSHistory(REUSE_MEMORY)
@@ -225,7 +212,7 @@ class NewtonRun(Descent):
         slope = dot(g, p)
         # Every direction is an iteration, also one that is taken back: the loop counts the first.
         watchdog = self.iterations - self.quasi_newton_steps >= WATCHDOG_AFTER
-        most = min(self.watchdog_steps, self.max_iterations - self.iterations - 1) if watchdog else 0
+        most = min(self.watchdog_steps, self.newton.max_iterations - self.iterations - 1) if watchdog else 0
         for k in range(most + 1 if slope < 0 else 0):  # none if it is nan
             step = self.spread(p)
             if not np.isfinite(p).all():
@@ -247,7 +234,7 @@ class NewtonRun(Descent):
                 self.projection_level, self.raised = projection, projection > first
                 self.watchdog_steps = WATCHDOG_STEPS
                 return True
-            if k == most or self.late(self.timeout):
+            if k == most or self.late(self.newton.timeout):
                 break
             p, projection = self.direction(self.assemble(CONVEXITY[projection]), projection)
             self.iterations += 1

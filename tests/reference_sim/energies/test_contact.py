@@ -53,7 +53,7 @@ def test_the_papers_stiffness_per_vertex_depends_on_the_mass_of_the_vertex():
     ],
 )
 def test_numbers_that_would_push_or_do_nothing_are_refused(make):
-    with pytest.raises(ValueError, match=r"must be (finite and not negative|a finite number)"):
+    with pytest.raises(ValueError, match=r"must be a finite number"):
         make(SHEET)
 
 

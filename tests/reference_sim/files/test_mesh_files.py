@@ -113,8 +113,8 @@ def test_a_sequence_that_does_not_correspond_is_refused(tmp_path):
     for pattern, message in (
         ("a", r"1\.obj: other vertices or faces than 0\.obj: a sequence needs one numbering"),
         ("b", r"several kinds \(\.obj, \.ply\)"),
-        ("empty", "no mesh in this folder"),
-        ("x_*.obj", "no file matches"),
+        ("empty", "no mesh: quote a pattern"),
+        ("x_*.obj", "no mesh: quote a pattern"),
     ):
         with pytest.raises(MeshError, match=message):
             read_sequence(tmp_path / pattern)
