@@ -8,66 +8,34 @@ import scipy.sparse as sp
 
 from reference_sim.cholesky import CholmodSolver, SuperLUSolver
 
-both = pytest.mark.parametrize("backend", [CholmodSolver, SuperLUSolver])
+SIZE = 60
+FACTOR = sp.random(SIZE, SIZE, density=0.05, random_state=1)
+LOWER = sp.tril(FACTOR @ FACTOR.T + sp.eye(SIZE), format="csc")
+DENSE = (LOWER + sp.tril(LOWER, -1).T).toarray()
+DIAGONAL = np.repeat(np.arange(SIZE), np.diff(LOWER.indptr)) == LOWER.indices
 
 
-class Problem:
-    """A random sparse symmetric matrix, of which the lower triangle is stored."""
-
-    def __init__(self, size: int, seed: int) -> None:
-        generator = np.random.default_rng(seed)
-        pattern = sp.random(size, size, density=0.1, random_state=seed) + sp.eye(size)
-        self.lower = sp.csc_matrix(sp.tril(pattern + pattern.T))
-        self.lower.sort_indices()
-        self.order = generator.permutation(size)
-        self.rows = self.lower.indices
-        self.columns = np.repeat(np.arange(size), np.diff(self.lower.indptr))
-        self.off = self.rows != self.columns
-        self.data = np.where(self.off, generator.normal(size=self.lower.nnz), 0.0)
-        self.data[~self.off] = np.abs(self.dense(self.data)).sum(axis=1) + 1.0  # diagonally dominant
-
-    def dense(self, data: np.ndarray) -> np.ndarray:
-        """The symmetric matrix that these values mean; what is stored above the diagonal is ignored."""
-        size = self.lower.shape[0]
-        lower = np.zeros((size, size))
-        lower[self.rows, self.columns] = data
-        lower = np.tril(lower)
-        return lower + np.tril(lower, -1).T
-
-    def solver(self, backend):
-        return backend(self.lower.indptr.astype(np.int64), self.rows.astype(np.int64), self.order)
-
-    def indefinite(self) -> np.ndarray:
-        """Values with one negative eigenvalue, in the middle of the matrix."""
-        data = self.data.copy()
-        data[np.flatnonzero(~self.off)[self.lower.shape[0] // 2]] = -1
-        assert np.linalg.eigvalsh(self.dense(data))[0] < 0
-        return data
+@pytest.fixture(params=[CholmodSolver, SuperLUSolver])
+def solver(request):
+    order = np.random.default_rng(0).permutation(SIZE)
+    return request.param(LOWER.indptr.astype(np.int64), LOWER.indices.astype(np.int64), order)
 
 
-@both
-def test_solves_as_dense_numpy_does(backend, size=60):
-    problem = Problem(size, seed=size)
-    solver = problem.solver(backend)
-    assert solver.factorise(problem.data)
-    generator = np.random.default_rng(0)
-    for b in (generator.normal(size=size), generator.normal(size=(size, 3))):
+def test_solves_as_dense_numpy_does(solver):
+    assert solver.factorise(LOWER.data)
+    for b in (np.arange(1.0, SIZE + 1), np.random.default_rng(0).normal(size=(SIZE, 3))):
         before = b.copy()
         x = solver.solve(b)
         assert x.shape == b.shape and (b == before).all()
-        # Diagonally dominant: condition number below 100 times round-off.
-        assert x == pytest.approx(np.linalg.solve(problem.dense(problem.data), b), rel=1e-12, abs=1e-13)
+        # Eigenvalues from 1 to some 10.
+        assert x == pytest.approx(np.linalg.solve(DENSE, b), rel=1e-11, abs=1e-12)
 
 
-@both
-def test_a_matrix_that_is_not_positive_definite_is_an_answer_and_makes_no_noise(backend, capfd):
-    problem = Problem(40, seed=7)
-    solver = problem.solver(backend)
-    assert not solver.factorise(problem.indefinite())
-    assert not solver.factorise(-problem.data)
-    assert not solver.factorise(0.0 * problem.data)
-    semidefinite = problem.data.copy()  # one zero row and column
-    semidefinite[(problem.rows == 5) | (problem.columns == 5)] = 0.0
-    assert not solver.factorise(semidefinite)
+@pytest.mark.parametrize("shift", [-1.0, -2.0, -20.0])
+def test_a_matrix_that_is_not_positive_definite_is_an_answer_and_makes_no_noise(solver, capfd, shift):
+    """A row without entries in the factor has nothing left on the diagonal; all of it is negative at last."""
+    assert np.linalg.eigvalsh(DENSE + shift * np.eye(SIZE))[0] < 1e-14
+    assert not solver.factorise(LOWER.data + shift * DIAGONAL)
+    assert not solver.factorise(0.0 * LOWER.data)
     captured = capfd.readouterr()
     assert captured.out == "" and captured.err == ""

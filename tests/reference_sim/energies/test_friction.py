@@ -26,15 +26,11 @@ def on_a_belt() -> BuiltScene:
     penalty = ContactPenalty(cloth)
     noise = np.random.default_rng(0).uniform(0.0, 5e-4, len(flat))
     start = (flat + np.stack([0 * noise, 1.5e-3 + noise, 0 * noise], axis=1)) @ TURN.T
+    terms = (StretchStVK(cloth), Gravity(cloth), penalty, ContactFriction(penalty))
     return BuiltScene(
-        name="belt",
-        cloth=cloth,
-        energies=(StretchStVK(cloth), Gravity(cloth), penalty, ContactFriction(penalty)),
-        dt=1 / 30,
-        frames=FRAMES,
-        settle=lambda: start,
+        name="belt", cloth=cloth, energies=terms, dt=1 / 30, frames=FRAMES, settle=lambda: start,
         obstacle=Obstacle((corners + across) @ TURN.T, sides),
-    )
+    )  # fmt: skip
 
 
 @pytest.fixture(scope="module")

@@ -21,21 +21,16 @@ def soup(count: int) -> tuple[np.ndarray, np.ndarray]:
     return positions, generator.integers(0, size, (count, 3))
 
 
-def mesh(name: str) -> tuple[np.ndarray, np.ndarray]:
-    if name.startswith("soup"):
-        return soup(int(name.split()[1]))
-    if name == "sphere":
-        return sphere(3)
-    if name == "sheet":
-        return grid(9, 5)
-    if name == "sliver":
-        return np.array([(0, 0, 0), (1, 0, 0), (0.4, 1e-7, 0), (2, 1e-12, 0), (0, 0, 1)]), np.array(
-            [(0, 1, 2), (2, 1, 0), (0, 3, 1), (0, 1, 4)]
-        )
-    return np.array([(0.5, 0.5, 0.5)] * 3), np.array([(0, 1, 2)])  # one triangle, and that a point
-
-
-MESHES = ("soup 2", "soup 400", "sphere", "sheet", "sliver", "point")
+SLIVER = np.array([(0, 0, 0), (1, 0, 0), (0.4, 1e-7, 0), (2, 1e-12, 0), (0, 0, 1)])
+MESHES = {
+    "soup 2": soup(2),
+    "soup 7": soup(7),
+    "soup 400": soup(400),
+    "sphere": sphere(3),
+    "sheet": grid(9, 5),
+    "sliver": (SLIVER, np.array([(0, 1, 2), (2, 1, 0), (0, 3, 1), (0, 1, 4)])),
+    "point": (np.array([(0.5, 0.5, 0.5)] * 3), np.array([(0, 1, 2)])),
+}
 
 
 def samples(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
@@ -77,7 +72,7 @@ def assert_closest(tree: FaceSearch, positions: np.ndarray, points: np.ndarray) 
 @pytest.mark.parametrize("kind", [np.float64, np.float32])
 @pytest.mark.parametrize("name", MESHES)
 def test_distances_are_those_of_libigl(name, kind):
-    positions, faces = mesh(name)
+    positions, faces = MESHES[name]
     positions = positions.astype(kind)
     assert_closest(tree_of(positions, faces), positions, samples(positions, faces).astype(kind))
 
@@ -102,7 +97,7 @@ def one_by_one(corners, points, centroids, home, region):
 
 @pytest.mark.parametrize("name", MESHES)
 def test_of_faces_equally_near_the_lowest_answers(name):
-    positions, faces = mesh(name)
+    positions, faces = MESHES[name]
     points = samples(positions, faces)[::5]
     points = np.concatenate([points, positions[:50], np.round(4 * points) / 4])
     corners = positions[np.sort(faces, axis=1)]
@@ -112,7 +107,7 @@ def test_of_faces_equally_near_the_lowest_answers(name):
 
 @pytest.mark.parametrize("name", ["soup 400", "sphere"])
 def test_what_is_remembered_changes_nothing(name):
-    positions, faces = mesh(name)
+    positions, faces = MESHES[name]
     tree, points = tree_of(positions, faces), samples(positions, faces)
     generator = np.random.default_rng(1)
     home = points[generator.permutation(len(points))]
@@ -126,7 +121,7 @@ def test_what_is_remembered_changes_nothing(name):
 
 @pytest.mark.parametrize("name", ["soup 400", "sphere"])
 def test_a_rough_answer_is_at_most_twice_as_far_and_exact_where_it_has_to_be(name):
-    positions, faces = mesh(name)
+    positions, faces = MESHES[name]
     tree, points = tree_of(positions, faces), samples(positions, faces)
     best = tree.nearest(points)
     distance = np.linalg.norm(points - best.points, axis=1)
@@ -141,7 +136,7 @@ def test_a_rough_answer_is_at_most_twice_as_far_and_exact_where_it_has_to_be(nam
 @pytest.mark.parametrize("region", [0.2, 0.7])
 @pytest.mark.parametrize("name", ["soup 7", "soup 400", "sheet"])
 def test_only_faces_near_the_place_at_rest_are_met(name, region):
-    positions, faces = mesh(name)
+    positions, faces = MESHES[name]
     centroids = positions[faces].mean(axis=1)
     tree = FaceSearch(faces, centroids)
     generator = np.random.default_rng(2)

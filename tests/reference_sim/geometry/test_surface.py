@@ -6,19 +6,10 @@ import igl
 import numpy as np
 import pytest
 
-from reference_sim.geometry.surface import (
-    faces_around,
-    normals_of_corners,
-    vertex_normals,
-    winding_numbers,
-)
+from reference_sim.geometry import surface
+from reference_sim.geometry.surface import winding_numbers
 from snug import Body
 from tests.reference_sim.meshes import sphere
-
-
-def by_solid_angles(vertices, faces, points):
-    angles = igl.winding_number(*map(np.asfortranarray, (vertices, faces, points)))
-    return np.asarray(angles).ravel().round().astype(int)
 
 
 def test_a_body_winds_as_its_solid_angles_say():
@@ -27,8 +18,9 @@ def test_a_body_winds_as_its_solid_angles_say():
     near = x[random.integers(len(x), size=300)] + random.normal(0.0, 0.01, (300, 3))
     points = np.concatenate([near, random.uniform(x.min(axis=0) - 0.1, x.max(axis=0) + 0.1, (200, 3))])
     windings = winding_numbers(x, body.faces, points)
+    angles = igl.winding_number(*map(np.asfortranarray, (x, body.faces, points)))
     assert 0 < (windings > 0).sum() < len(windings)
-    assert windings.tolist() == by_solid_angles(x, body.faces, points).tolist()
+    assert windings.tolist() == np.asarray(angles).ravel().round().tolist()
 
 
 @pytest.mark.parametrize("longest", [0, 1, 2])
@@ -50,6 +42,6 @@ def test_normals_of_some_corners_are_those_of_the_whole_mesh_to_the_bit() -> Non
     positions, faces = sphere(3, 0.1)
     positions = positions + np.random.default_rng(0).normal(0, 0.005, positions.shape)
     some = np.array([3, 4, 3, 77])
-    normals = normals_of_corners(some, positions, faces, *faces_around(faces, len(positions)))
-    corners = faces[some]
-    assert np.array_equal(normals[corners], vertex_normals(positions, faces)[corners])
+    around = surface.faces_around(faces, len(positions))
+    normals = surface.normals_of_corners(some, positions, faces, *around)[faces[some]]
+    assert np.array_equal(normals, surface.vertex_normals(positions, faces)[faces[some]])

@@ -35,8 +35,6 @@ def pressed(seed: int, *, pins: tuple[int, ...] = (0, 6)) -> tuple[Potential, np
 
 def in_float32(solver: CompiledLBFGS, x0: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Energies and gradient of the compiled kernels at x0 + u."""
-    solver.max_iterations = 0
-    solver.minimise(x0)  # freezes edges and planes at x0
     energies, gradient = np.zeros_like(solver._energies), np.empty(u.size, np.float32)
     target = (solver._terms.inertia.x_hat - x0).astype(np.float32).ravel()
     evaluate(
@@ -46,22 +44,17 @@ def in_float32(solver: CompiledLBFGS, x0: np.ndarray, u: np.ndarray) -> tuple[np
     return energies, gradient.reshape(u.shape)
 
 
-@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("size", [0.0, 1e-3, 2e-2])
-def test_each_energy_and_its_gradient_is_that_of_its_definition(seed, size):
+def test_each_energy_and_its_gradient_is_that_of_its_definition(size, seed=1):
     potential, x0 = pressed(seed)
     u = np.random.default_rng(seed).normal(0, size, x0.shape).astype(np.float32).astype(float)
     energies, gradient = in_float32(CompiledLBFGS(potential, max_iterations=1), x0, u)
-    values, gradients = zip(*(energy.value_and_gradient(x0 + u) for energy in potential.energies))
-    names = [energy.name for energy in potential.energies]
-    value = dict(zip(names, values))
-    weight = potential.cloth.masses * 9.81
-    value["gravity"] = float(weight @ u[:, 1])  # from x0 on
+    value, whole = potential.terms(x0 + u), potential.gradient(x0 + u)
+    value["gravity"] = float(potential.cloth.masses * 9.81 @ u[:, 1])  # from x0 on
     assert value["collision"] > 0
     order = ("inertia", "gravity", "strain", "bending", "collision")
     for name, term in zip(order, energies):
         assert term == pytest.approx(value[name], rel=2e-5, abs=1e-9), name
-    whole = sum(gradients)
     whole[potential.cloth.pins] = 0.0
     assert np.abs(gradient - whole).max() < 3e-6 * np.abs(whole).max()
 
@@ -107,8 +100,8 @@ def test_iterations_are_those_of_the_exact_solver(iterations):
     exact = LBFGS(potential, max_iterations=iterations, finish=False).minimise(guess)
     descent = CompiledLBFGS(potential, max_iterations=iterations).minimise(guess)
     assert descent.iterations == iterations == exact.iterations and descent.status == "max_iterations"
-    start, reached = potential.value(guess), potential.value(descent.positions)
-    assert start - reached == pytest.approx(start - exact.energy, rel=2e-3)
+    start = potential.value(guess)
+    assert start - potential.value(descent.positions) == pytest.approx(start - exact.energy, rel=2e-3)
     assert np.abs(descent.positions - exact.positions).max() < 0.02 * np.abs(exact.positions - guess).max()
     assert np.array_equal(descent.positions[potential.cloth.pins], guess[potential.cloth.pins])
     assert descent.terms == pytest.approx(potential.terms(descent.positions), rel=1e-4, abs=1e-8)

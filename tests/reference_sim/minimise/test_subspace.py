@@ -48,19 +48,14 @@ def basis(size: int) -> np.ndarray:
     return orthonormal(np.kron(flat, np.eye(3))).reshape(COUNT, 3, -1)
 
 
-def solved(space: np.ndarray, offsets: np.ndarray | None = None, placement: Placement | None = None):
-    start = np.zeros((COUNT, 3)) if offsets is None else offsets
-    steps = [placement or placed()]
-    return SubspaceNewton(potential(), basis=space, placements=steps, offsets=start).minimise(SHEET)
-
-
-def gradient_of(energy, q: torch.Tensor) -> torch.Tensor:
-    return functional.jacobian(energy, q)
+def solver_of(space: np.ndarray, *placements: Placement) -> SubspaceNewton:
+    start = np.zeros((COUNT, 3))
+    return SubspaceNewton(potential(), basis=space, placements=placements, offsets=start)
 
 
 def test_the_residual_of_a_minimum_is_that_of_automatic_differentiation():
     space, terms, placement = basis(6), potential(), placed()
-    result = solved(space)
+    result = solver_of(space, placement).minimise(SHEET)
     columns, turns = torch.from_numpy(space), torch.from_numpy(placement.turns)
 
     def energy(q: torch.Tensor) -> torch.Tensor:
@@ -73,18 +68,17 @@ def test_the_residual_of_a_minimum_is_that_of_automatic_differentiation():
     q = torch.from_numpy(np.einsum("vik,vi->k", space, placement.unposed(result.positions)))
     weight = terms.cloth.masses.mean() * 9.81
     assert float(energy(q)) == pytest.approx(result.energy, rel=1e-10)
-    at_minimum = gradient_of(energy, q).abs().max() / weight
+    at_minimum = functional.jacobian(energy, q).abs().max() / weight
     assert at_minimum < 2e-6 and result.gradient_norm < 1e-6
     # Elsewhere too, and second derivatives.
     elsewhere = q + 0.01 * torch.randn(len(q), generator=torch.Generator().manual_seed(0), dtype=q.dtype)
     x = placement.posed(np.einsum("vik,k->vi", space, elsewhere.numpy()))
-    solver = SubspaceNewton(terms, basis=space, placements=[], offsets=placement.unposed(x))
-    free = terms.cloth.free
+    solver, free = solver_of(space), terms.cloth.free
     posed = np.einsum("vij,vjk->vik", placement.turns, space)[free].reshape(3 * free.sum(), -1)
     assert isinstance(solver.hessian, SubspaceHessian)
     solver.hessian.basis = posed
     run = SubspaceRun(solver, x, None)
-    gradient, hessian = gradient_of(energy, elsewhere).numpy(), functional.hessian(energy, elsewhere).numpy()
+    gradient, hessian = (f(energy, elsewhere).numpy() for f in (functional.jacobian, functional.hessian))
     assert run.gradient_norm() == pytest.approx(np.abs(gradient).max() / weight, rel=1e-8)
     hessian += 1e3 * posed.T @ (solver.hessian.metric[:, None] * posed)
     assert run.factorise(run.assemble(0.0), 1e3)
@@ -95,7 +89,7 @@ def test_the_residual_of_a_minimum_is_that_of_automatic_differentiation():
 
 def test_a_run_that_starts_again_gives_the_bits_of_the_first():
     steps = [placed(), Placement(placed().turns, SHEET + np.array([0.0, 0.0, 0.01]))]
-    solver = SubspaceNewton(potential(), basis=basis(4), placements=steps, offsets=np.zeros((COUNT, 3)))
+    solver = solver_of(basis(4), *steps)
     runs = []
     for _ in range(2):
         runs.append([solver.minimise(SHEET).positions for _ in steps])
