@@ -162,10 +162,7 @@ class Obstacle:
         sample (from the sample, when that is inside), which makes n.(x - c) the signed distance at the
         sample's own position. Beyond the border of the allowed faces it fades: see `surface.plane_normals`.
 
-        Args:
-            points: (S, 3) [m] samples.
-            frame: of the obstacle.
-            rest_points: (S, 3) [m] the samples at rest, for the rule of regions.
+        points (S, 3) [m]: samples. rest_points (S, 3) [m]: the samples at rest, for the rule of regions.
         """
         closest = self._nearest(points, frame, rest_points)
         vertices = self.at(frame)

@@ -128,10 +128,8 @@ class HessianPattern:
     ) -> np.ndarray:
         """Return the values (nnz,) [N/m] of the lower matrix: Hessian, or scalar stiffness for block 1.
 
-        Args:
-            x: (V, 3) [m].
-            changing: Hessians of the dynamic terms at x, which this pattern must cover.
-            convexity: see Energy.active_hessian_blocks.
+        changing: Hessians of the dynamic terms at x (V, 3), which this pattern must cover. convexity: see
+        Energy.active_hessian_blocks.
         """
         values = self._constant.copy()
         for energy, slots in zip(self.energies, self._slots):

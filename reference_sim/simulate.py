@@ -98,11 +98,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def read_cloth(options: argparse.Namespace) -> Cloth:
-    """Return the cloth of the garment's file, its pins and material.
-
-    Raises:
-        ValueError: a file, an option or the mesh is no good; the message names it and the remedy.
-    """
+    """Return the cloth of the garment's file. Raises ValueError that names file or option, and remedy."""
     material = Material.from_file(options.material) if options.material else Material()
     surface = read_mesh(options.garment)
     positions = to_metres_y_up(surface.positions, units=options.units, up=options.up)
@@ -113,11 +109,7 @@ def read_cloth(options: argparse.Namespace) -> Cloth:
 
 
 def choose_pins(which: str | None, positions: np.ndarray) -> list[int]:
-    """Return the vertices that `which` names among positions (V, 3) [m, y up]: "0,9,12", or "top".
-
-    Raises:
-        ValueError: not understood, or an index out of range.
-    """
+    """Return the vertices that `which` names among positions (V, 3) [m, y up]: "0,9,12", or "top"."""
     if which is None:
         return []
     if which == "top":
@@ -131,11 +123,7 @@ def choose_pins(which: str | None, positions: np.ndarray) -> list[int]:
 
 
 def read_obstacle(options: argparse.Namespace) -> Obstacle | None:
-    """Return the obstacle; None without one.
-
-    Raises:
-        ValueError: a file or the mesh is no good; the message names it and the remedy.
-    """
+    """Return the obstacle; None without one. Raises ValueError that names the file, and the remedy."""
     if options.obstacle is None:
         return None
     from reference_sim.obstacle import Obstacle  # its search for contact serves no cloth that meets nothing

@@ -31,10 +31,9 @@ BLOCKS = 39  # rows of lanes before those of the blocks, in _hessian
 
 
 class BendHinge(Energy):
-    """Hinge bending energy [J] of each inner edge of `cloth`.
+    """Hinge bending energy [J] of each inner edge of `cloth`, whose material gives k [J].
 
     Args:
-        cloth: the rest state; its material gives k [J].
         scaling: "length_area" or "none" (as the paper prints it).
         rest_angles: (H,) [rad], "rest" for the angles of rest_positions, or 0 (default: flat).
 

@@ -38,8 +38,8 @@ class ContactFriction(Energy):
         speed: [m/s].
 
     Raises:
-        ValueError: a negative coefficient, or a speed that is not above 0; at prepare, if the contact was not
-            prepared for the same step; when evaluated, if the step before was not prepared.
+        ValueError: a negative coefficient, or a speed that is not above 0; in `prepare`, where the contact was
+            not prepared for the step; in evaluations, where the step before was not.
     """
 
     name = "friction"

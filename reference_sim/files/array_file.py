@@ -41,11 +41,7 @@ def read_array(path: str | Path) -> np.ndarray:
 
 
 def read_arrays(path: str | Path, names: Collection[str] | None = None) -> dict[str, np.ndarray]:
-    """Read the arrays of an .npz file by name.
-
-    Args:
-        path: the file.
-        names: arrays to read, as far as they are in it; others are not touched. Default all.
+    """Read those of the named arrays that an .npz file holds, by default all; others are not touched.
 
     Raises:
         ArrayFileError: no such file, no archive, damaged, or an array that is not plain.
@@ -148,11 +144,9 @@ class _Unpickler(pickle.Unpickler):
 
 
 def read_pickled_arrays(path: str | Path, names: Collection[str]) -> dict[str, np.ndarray]:
-    """Read the arrays, numbers and lists of a pickled dict by name, without running anything that it names.
+    """Read those of the named arrays, numbers and lists that a pickled dict holds; nothing in it is run.
 
-    Args:
-        path: the file. Text of Python 2 in it is taken as latin-1.
-        names: entries to return, as far as they are in it.
+    Text of Python 2 is taken as latin-1.
 
     Raises:
         ArrayFileError: no such file, no pickle of a dict, or more in it than plain values.

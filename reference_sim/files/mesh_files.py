@@ -141,10 +141,7 @@ def _surface(
         raise MeshError(f"{path}: vertices have shape {positions.shape}: expected three coordinates each")
     bad = np.flatnonzero(~(np.abs(positions) < LARGEST_COORDINATE).all(axis=1))
     if bad.size:
-        where = positions[bad[0]].tolist()
-        raise MeshError(
-            f"{path}: vertex {bad[0]} is not finite, or farther than {LARGEST_COORDINATE:g}: {where}"
-        )
+        raise MeshError(f"{path}: vertex {bad[0]} is not finite, or farther than {LARGEST_COORDINATE:g}")
     corners = np.array([len(polygon) for polygon in polygons])
     if corners.max() > 4 or corners.min() < 3:
         k = int(np.argmax((corners > 4) | (corners < 3)))
@@ -200,11 +197,7 @@ def read_sequence(pattern: str | Path) -> tuple[np.ndarray, Surface]:
 
 
 def _paths(pattern: str) -> list[Path]:
-    """Return the files that `read_sequence` reads, in its order.
-
-    Raises:
-        MeshError: there are none, or they are of several kinds.
-    """
+    """Return the files that `read_sequence` reads. Raises MeshError for none, or several kinds."""
     path = Path(pattern)
     if path.is_dir():
         paths = [p for p in path.iterdir() if p.suffix.lower() in MESH_SUFFIXES]
@@ -222,13 +215,7 @@ def _paths(pattern: str) -> list[Path]:
 def to_metres_y_up(positions: np.ndarray, *, units: str = "m", up: str = "y") -> np.ndarray:
     """Bring positions (..., 3) of a file to metres with y up; z up is turned by a quarter about x.
 
-    Args:
-        positions: (..., 3) in the file's unit and axes.
-        units: a key of METRES.
-        up: one of UP_AXES.
-
-    Raises:
-        ValueError: unknown unit or axis.
+    units: a key of METRES. up: one of UP_AXES. Raises ValueError for others.
 
     >>> to_metres_y_up(np.array([[0.0, 0.0, 170.0]]), units="cm", up="z")
     array([[ 0. ,  1.7, -0. ]])
@@ -279,9 +266,7 @@ def join_seams(surface: Surface) -> tuple[Surface, np.ndarray]:
 def rest_chart(surface: Surface, scale: float) -> np.ndarray:
     """Return the chart (F, 3, 2) [m] of a surface in metres, as `Cloth` takes it for `rest_uv`.
 
-    Args:
-        surface: positions in metres.
-        scale: metres per unit of the chart.
+    scale: metres per unit of the chart.
 
     Raises:
         MeshError: no chart, a corner or an area missing, a total area further than `AREA_FACTOR` from that of
@@ -322,11 +307,8 @@ def rest_chart(surface: Surface, scale: float) -> np.ndarray:
 def stretches(corners: np.ndarray, chart: np.ndarray) -> np.ndarray:
     """Return the principal stretches (F, 2), the larger first, from a chart to a mesh.
 
-    They are the singular values of F = [x1 - x0, x2 - x0] Dm^-1.
-
-    Args:
-        corners: (F, 3, 3) of the mesh.
-        chart: (F, 3, 2), no triangle without area.
+    They are the singular values of F = [x1 - x0, x2 - x0] Dm^-1, for corners (F, 3, 3) of the mesh and a
+    chart (F, 3, 2), no triangle without area.
     """
     Dm = np.stack([chart[:, 1] - chart[:, 0], chart[:, 2] - chart[:, 0]], axis=-1)
     Ds = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=-1)

@@ -165,7 +165,7 @@ def carry(points, closest, closest_faces, barycentric, before, after, faces, car
 
 
 def winding_numbers(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return how often a closed mesh winds around each point.
+    """Return how often (P,) a closed mesh winds around each point.
 
     Rays run along the shortest side of the mesh's bounding box, so that each meets few faces; a grid over the
     other two axes has the faces that a ray may meet. A ray through a side or a corner is moved by less than
@@ -174,10 +174,7 @@ def winding_numbers(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray)
     Args:
         vertices: (B, 3) [m].
         faces: (F, 3) outward wound; each side belongs to two faces, which pass it in opposite directions.
-        points: (P, 3) [m].
-
-    Returns:
-        (P,) integers. Of a point on the surface: as of one beside it.
+        points: (P, 3) [m]. One on the surface counts as one beside it.
 
     >>> corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
     >>> faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])

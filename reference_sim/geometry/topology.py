@@ -25,10 +25,7 @@ def edge_uses(faces: Index) -> tuple[Index, Index]:
 
 
 def boundary_loops(faces: Index) -> list[Index]:
-    """Return the boundary loops of a manifold mesh (F,3), longest first.
-
-    Returns:
-        Vertex indices of each loop, in order along the winding of the faces.
+    """Return the vertices of the boundary loops of a manifold mesh (F,3), along its winding, longest first.
 
     Raises:
         ValueError: the mesh is not manifold at its boundary.
@@ -88,11 +85,7 @@ LEAST_AREA_RATIO = 1e-12  # area of a face relative to the mean, below which it 
 
 
 def check_closed(positions: np.ndarray, faces: np.ndarray) -> None:
-    """Refuse a mesh that is no moving closed surface.
-
-    Args:
-        positions: (T, B, 3) [m].
-        faces: (F, 3).
+    """Refuse positions (T, B, 3) [m] and faces (F, 3) that are no moving closed surface.
 
     Raises:
         MeshError: wrong shapes, no frame, NaN, a face without area, an open, non-manifold, inconsistently

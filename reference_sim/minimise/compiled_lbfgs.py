@@ -184,12 +184,8 @@ MEMORY = 10
 class CompiledLBFGS:
     """A minimiser bound to one potential.
 
-    Args:
-        max_iterations: after which it stops.
-        tolerance: relative residual, as in Newton, at which it stops sooner.
-
-    Raises:
-        ValueError: a term that it has no kernel for, or no inertia.
+    It stops after max_iterations, or where the relative residual is within the tolerance. Raises ValueError
+    for a term that it has no kernel for, or no inertia.
     """
 
     def __init__(self, potential: Potential, *, max_iterations: int, tolerance: float = TOLERANCE) -> None:

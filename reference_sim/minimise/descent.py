@@ -48,11 +48,10 @@ class LBFGSHistory:
             self._count += 1
 
     def direction(self, g: np.ndarray, solve: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
-        """Return -H g (3n,) by the two-loop recursion (Nocedal and Wright 2006, algorithm 7.4).
+        """Return -H g (3n,) for a gradient g (3n,) [N] by the two-loop recursion.
 
-        Args:
-            g: (3n,) gradient [N].
-            solve: applies the first guess of the inverse Hessian, which the pairs correct.
+        solve: applies the first guess of the inverse Hessian, which the pairs correct. Source: Nocedal and
+        Wright 2006, algorithm 7.4.
         """
         q, alphas = -g, np.empty(len(self))
         order = np.arange(self._count - len(self), self._count) % max(self._memory, 1)  # oldest first
@@ -152,7 +151,6 @@ class Descent:
     """State of one minimisation over the free vertices of a cloth.
 
     Args:
-        potential: the sum of energies.
         x: (V, 3) [m] start.
         after: an earlier descent, whose counts and clock go on.
 
@@ -212,13 +210,8 @@ class Descent:
     def line_search(self, p: np.ndarray, slope: float, allowed: float | None = None) -> float:
         """Halve the step along p (3n,) until the energy falls enough, and go there.
 
-        Args:
-            p: (3n,) [m].
-            slope: of the energy along p [J].
-            allowed: share of p that no term forbids, where it is known already.
-
-        Returns:
-            The share of p that was taken, 0 if none would do.
+        slope: of the energy along p [J]. allowed: share of p that no term forbids, where it is known already.
+        Returns the share of p that was taken, 0 if none would do.
         """
         step = self.spread(p)
         alpha = self.potential.largest_step(self.x, step) if allowed is None else allowed

@@ -93,10 +93,8 @@ def convergence_check(run: NewtonRun, values: np.ndarray, round_off: float) -> S
     Asks whether the true Hessian is positive definite (up to round-off, so that rigid motions of an unpinned
     cloth do not count) and its step small. Off a saddle it takes a step, which is an iteration.
 
-    Args:
-        run: the minimisation.
-        values: (nnz,) values of its true Hessian.
-        round_off: of the residual [1]. It excuses a residual above the tolerance, and the reason says so.
+    values (nnz,): of its true Hessian. round_off: of the residual [1]; it excuses one above the tolerance,
+    and the reason says so.
     """
     tolerance, step_tolerance = run.newton.tolerance, run.newton.step_tolerance
     residual = run.gradient_norm()

@@ -46,7 +46,6 @@ class LBFGS:
     """Preconditioned L-BFGS for one potential, finished by Newton's method.
 
     Args:
-        potential: the sum of energies.
         tolerance: as in Newton.
         max_iterations: iterations, of Newton's too, before giving up with status max_iterations.
         memory: number of remembered steps; 0 is preconditioned gradient descent.

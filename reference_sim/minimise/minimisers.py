@@ -35,15 +35,9 @@ MINIMISERS: dict[str, Callable[..., Minimiser]] = {"newton": Newton, "lbfgs": LB
 def make_minimiser(
     potential: Potential, method: str | Callable[..., Minimiser] = "newton", **options: Any
 ) -> Minimiser:
-    """Return a minimiser by name, for a caller that minimises the same potential again and again.
+    """Return a minimiser, for a caller that minimises the same potential again and again.
 
-    Args:
-        potential: the sum of energies.
-        method: a name in MINIMISERS, or a function that is called as `method(potential, **options)`.
-        options: of the method's class.
-
-    Raises:
-        ValueError: unknown name.
+    method: a name in MINIMISERS, or a function of potential and options. Raises ValueError for other names.
     """
     if callable(method):
         return method(potential, **options)

@@ -55,7 +55,6 @@ class Newton:
     """Newton's method for one potential: its symbolic analysis is done once and serves every step.
 
     Args:
-        potential: the sum of energies.
         tolerance: largest relative residual at the end, see `Result.gradient_norm`.
         max_iterations: iterations before giving up with status max_iterations; every direction solved for is
             one, also one that is taken back.

@@ -97,7 +97,6 @@ class SubspaceNewton(Newton):
     """Newton's method from step to step in a subspace that follows its placements.
 
     Args:
-        potential: the sum of energies.
         basis: U, (V, 3, K), with orthonormal columns; zero at pinned vertices.
         placements: one for each step of a run.
         offsets: (V, 3) in the span: where the first step of a run starts.

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from reference_sim.cloth import MeshError
-from reference_sim.files.mesh_files import read_mesh, read_sequence, to_metres_y_up
+from reference_sim.files.mesh_files import read_mesh, read_sequence
 from tests.reference_sim.meshes import grid, sphere
 
 
@@ -114,14 +114,3 @@ def test_a_sequence_that_does_not_correspond_is_refused(tmp_path):
     ):
         with pytest.raises(MeshError, match=message):
             read_sequence(tmp_path / pattern)
-
-
-def test_units_and_up_axis_keep_handedness():
-    axes = np.eye(3)
-    assert to_metres_y_up(axes, units="cm").tolist() == (0.01 * axes).tolist()
-    turned = to_metres_y_up(axes, units="mm", up="z")
-    assert turned[2].tolist() == [0, 0.001, 0]  # up is up
-    assert np.linalg.det(turned) == pytest.approx(1e-9)
-    for bad in ({"units": "ft"}, {"up": "x"}):
-        with pytest.raises(ValueError, match="choose from"):
-            to_metres_y_up(axes, **bad)

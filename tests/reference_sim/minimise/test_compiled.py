@@ -7,13 +7,11 @@ import pytest
 
 from benchmarks.meshes import sphere, square_sheet
 from reference_sim import Cloth, Material, Obstacle, Potential
-from reference_sim.cholesky import WIDTH, ScalarPattern, factorise, solve
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Inertia, Step, StretchStVK
 from reference_sim.minimise import lbfgs
 from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS, evaluate
 from reference_sim.minimise.lbfgs import LBFGS
 from reference_sim.minimise.newton import Newton
-from tests.reference_sim.meshes import patch
 
 DT = 1 / 30
 
@@ -57,41 +55,6 @@ def test_each_energy_and_its_gradient_is_that_of_its_definition(size, seed=1):
         assert term == pytest.approx(value[name], rel=2e-5, abs=1e-9), name
     whole[potential.cloth.pins] = 0.0
     assert np.abs(gradient - whole).max() < 3e-6 * np.abs(whole).max()
-
-
-@pytest.mark.parametrize("cells, pinned", [(2, 0), (6, 0), (6, 5)])
-def test_the_factor_solves(cells, pinned):
-    rng = np.random.default_rng(cells + pinned)
-    positions, faces = patch(cells, cells)
-    number = np.full(len(positions), -1)
-    free = np.sort(rng.permutation(len(positions))[pinned:])
-    number[free] = np.arange(len(free))
-    stencils, n = number[faces], len(free)
-    pattern = ScalarPattern(n, [stencils])
-    parts = rng.normal(size=(len(faces), 3, 3))
-    parts = parts @ parts.transpose(0, 2, 1)
-    dense, values = np.eye(n), np.zeros(pattern.entries)
-    values[len(pattern.row_columns) :] = 1.0
-    for stencil, part in zip(stencils, parts):
-        kept = stencil >= 0
-        dense[np.ix_(stencil[kept], stencil[kept])] += part[np.ix_(kept, kept)]
-    places = pattern.places(stencils)
-    np.add.at(values, places[places >= 0], parts[places >= 0])
-    L, D, b = np.empty(len(pattern.rows)), np.empty(n), np.zeros((n, WIDTH))
-    structure = (
-        pattern.row_starts, pattern.row_columns, pattern.factor_rows, pattern.factor_columns, pattern.starts,
-        pattern.rows,
-    )  # fmt: skip
-    room = np.zeros(n), np.empty(n, np.int64)
-    assert factorise(values, *structure, L, D, *room)
-    right = rng.normal(size=(n, 3))
-    b[:, :3] = right[pattern.order]
-    solve(pattern.starts, pattern.rows, L, D, b)
-    solution = np.empty_like(right)
-    solution[pattern.order] = b[:, :3]
-    assert np.abs(dense @ solution - right).max() < 1e-10
-    values[len(pattern.row_columns) :] -= 100.0
-    assert not factorise(values, *structure, L, D, *room)
 
 
 @pytest.mark.parametrize("iterations", [1, 10])
