@@ -38,7 +38,7 @@ class ContactFriction(Energy):
         speed: [m/s].
 
     Raises:
-        ValueError: a negative coefficient, or a speed that is not above 0; in `prepare`, where the contact was
+        ValueError: a negative coefficient, or a speed that is not above 0; in `prepare`, if the contact was
             not prepared for the step; in evaluations, where the step before was not.
     """
 
