@@ -144,10 +144,6 @@ def damaged(folder: Path, digests: Mapping[str, str]) -> str:
 
 # Prose, compiled kernels; and trained networks: a task that reads one names its digest.
 NO_PART = (".pyc", ".md", ".nbi", ".nbc", ".safetensors")
-# Commands decide no result.
-NO_RESULT = (
-    "reference_sim/command_line.py", "reference_sim/simulate.py", "snug/check.py", "snug/train.py",
-)  # fmt: skip
 
 
 def software(*places: str) -> dict[str, str]:
@@ -227,7 +223,7 @@ def files_of(place: str) -> list[Path]:
     def counts(file: Path) -> bool:
         name = file.relative_to(ROOT)
         hidden = any(part.startswith((".", "__pycache__")) for part in name.parts)
-        return file.suffix not in NO_PART and not hidden and not name.as_posix().startswith(NO_RESULT)
+        return file.suffix not in NO_PART and not hidden
 
     files = [path] if path.is_file() else sorted(p for p in path.rglob("*") if p.is_file())
     return list(filter(counts, files))

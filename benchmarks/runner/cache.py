@@ -3,8 +3,8 @@
 An entry names the inputs, code, packages and files that its outcome came of; where one of them is another
 now, the result is stale, and the task is done again.
 An entry is written whole after the files that it speaks of. A run that is killed therefore loses what it was
-at, and nothing else. It holds the digest of each of its files, and of itself: what is not as it was written
-is missing, and done again.
+at, and nothing else. It holds the digest of each of its files: what is not as it was written is missing, and
+done again.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import dataclasses
 import json
 import shutil
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -64,12 +65,14 @@ class Cache:
         path = self.path(task)
         if not path.is_file():
             return Cached("missing")
-        entry = read_entry(path)
-        if entry is None or entry["task"] != task.title:
+        entry: dict[str, Any] = {}
+        with suppress(ResultsError):
+            entry = read_json(path)
+        if (entry.get("format"), entry.get("task")) != (FORMAT, task.title):
             return Cached("missing: its entry is damaged or of another version")
         if damage := damaged(self.folder.path, entry["files"]):
             return Cached(f"missing: {damage}")
-        now, before = dependencies(task) | _read(task, others), entry["parts"] | entry["needs"]
+        now, before = dependencies(task) | _read(task, others), entry["parts"]
         if changed := [name for name in now | before if now.get(name) != before.get(name)]:
             return Cached("stale: " + ", ".join(changed[:3]) + (", ..." if len(changed) > 3 else ""))
         files = entry["files"]
@@ -84,15 +87,13 @@ class Cache:
         entry = {
             "format": FORMAT,
             "task": task.title,
-            "parts": dependencies(task),
-            "needs": _read(task, others),
+            "parts": dependencies(task) | _read(task, others),
             "origin": outcome.origin,
             "files": files,
             "outcome": {name: getattr(outcome, name) for name in _KEPT},
         }
-        text = _text(entry | {"digest": digest(_text(entry).encode())})
         with replacing(self.path(task)) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+            temporary.write_text(json.dumps(entry, indent=1, ensure_ascii=False), encoding="utf-8")
         return Cached("", outcome, _content(entry))
 
     def forget_all(self) -> None:
@@ -104,16 +105,6 @@ class Cache:
     def path(self, task: Task) -> Path:
         """Return cache/<kind>/<name>.json in the run's folder."""
         return self.folder.cache / task.kind / f"{task.name}.json"
-
-
-def read_entry(path: Path) -> dict[str, Any] | None:
-    """Return an entry as it was written, or None where it is damaged or of another format."""
-    try:
-        entry = read_json(path)
-    except ResultsError:
-        return None
-    whole = entry.pop("digest", "") == digest(_text(entry).encode())
-    return entry if whole and entry.get("format") == FORMAT else None
 
 
 _KEPT = ("status", "reason", "failed", "result", "seconds")
@@ -128,7 +119,3 @@ def _read(task: Task, others: Mapping[TaskId, Cached]) -> dict[str, str]:
 def _content(entry: Mapping[str, Any]) -> str:
     """Return a digest of the files and the outcome, whatever time they took."""
     return digest([entry["files"], entry["outcome"] | {"seconds": 0.0}])
-
-
-def _text(entry: Mapping[str, Any]) -> str:
-    return json.dumps(entry, indent=1, ensure_ascii=False) + "\n"

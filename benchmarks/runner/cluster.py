@@ -12,7 +12,6 @@ import pickle
 import platform
 import sys
 import threading
-import time
 import uuid
 from collections.abc import Iterator, Sequence
 from concurrent.futures import CancelledError, ThreadPoolExecutor, wait
@@ -33,7 +32,6 @@ if TYPE_CHECKING:
     from distributed import Client, Future
 
 FIRST = 5.0  # [s] in which a scheduler answers at first
-LOOK = 2.0  # [s] between looks at how many threads there are
 PATIENCE = 60.0  # [s] for a scheduler that was lost to be there again
 WATCH = 0.5  # [s] between a worker's looks at whether its task is still wanted
 
@@ -73,18 +71,17 @@ class Cluster:
         self._futures: set[Future] = set()
         self._stopped = False
         self.rest()
-        self._threads, self._looked = sum(self.client.nthreads().values()), time.monotonic()
-        if not self._threads:
+        self._slots = 1
+        if not self.client.nthreads():
             print(f"waiting for workers: dask worker {address} --nthreads 1", file=sys.stderr)
 
     @property
     def slots(self) -> int:
         """Number of batches that are done at once. Without a worker the first one waits for it."""
-        if time.monotonic() > self._looked + LOOK and self.client.status == "running":
+        if self.client.status == "running":
             with suppress(OSError):  # no scheduler: the client is looking for it
-                self._threads = sum(self.client.nthreads().values())
-            self._looked = time.monotonic()
-        return max(1, self._threads)
+                self._slots = max(1, sum(self.client.nthreads().values()))
+        return self._slots
 
     def do(self, tasks: Sequence[Task], needed: Needed) -> Iterator[Outcome]:
         """Yield the outcomes of a batch, done by one process where its worker lives.

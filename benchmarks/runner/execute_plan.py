@@ -200,19 +200,13 @@ def describe(plan: Plan) -> str:
 
 
 def _head(plan: Plan) -> list[str]:
-    garment, skipped = plan.inputs.garment, sum(not runs(cell) for cell in plan.cells)
-    sizes = (
-        f"{name} of {garment.path}"
-        if garment and name == garment.name
-        else f"{name} of about {plan.preset.garment_vertices} vertices"
-        for name in plan.garments
-    )
+    skipped = sum(not runs(cell) for cell in plan.cells)
+    files = [str(file.path) for file in (plan.inputs.body, plan.inputs.garment) if file]
     return [
         f"preset {plan.preset.name}: {plan.preset.description}",
         f"folder {plan.folder}",
         f"suites {', '.join(plan.suites)}; seeds {', '.join(map(str, plan.seeds))}; device {plan.device}; "
         f"{plan.scheduler or f'{plan.workers} workers'}, timed cells alone here",
-        *([f"body {plan.inputs.body.path}"] if plan.inputs.body else []),
-        *sizes,
+        *files,
         f"{len(plan.cells)} cells, {skipped} skipped, {len(plan.cases)} cases",
     ]

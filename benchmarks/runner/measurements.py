@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numbers
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,48 +12,40 @@ import numpy as np
 
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts, measurements_in
 from benchmarks.metrics import MEASUREMENTS, find_metric, measured_in
-from benchmarks.plan.cell import Cell, TaskId
+from benchmarks.plan.cell import Cell, TaskId, flat
 from benchmarks.results.protocol import spread
 from benchmarks.results.row import STATUSES, USABLE
 from benchmarks.results.run_folder import SECONDS
 from benchmarks.runner.cells import build_scene
 from benchmarks.runner.task import Context, Needed, Outcome, one_line
+from benchmarks.scene import Scene
 from reference_sim.files.atomic_files import replacing
 
 
-@dataclass(frozen=True, kw_only=True)
-class Measurement:
-    """Metrics of a cell's trajectory, compared with those of the reference and its variants.
+def measure_cell(
+    cell: Cell, cells: tuple[Cell, ...], gap_samples: int, outside: tuple[str, ...], context: Context,
+    needed: Needed,
+) -> Outcome:  # fmt: skip
+    """Measure the trajectory, and write energies of each frame and other curves beside it.
 
-    Attributes:
+    Args:
         cell: the cell.
         cells: all of the scene, in the order of their roll-outs; those whose outcomes are given are compared
             with.
         gap_samples: frames in which the energy gap is measured.
-        quasi_static: the simulator's answer to poses held still.
-        counterpart: the same method in another scene.
         outside: files of metrics that are not the project's, measured in every scene.
+        context: of the process; the roll-outs of a batch share search trees, and the energies of references.
+        needed: outcomes of the cells, of the quasi-static solution, and of the method in another scene.
     """
-
-    cell: Cell
-    cells: tuple[Cell, ...]
-    gap_samples: int
-    quasi_static: TaskId | None = None
-    counterpart: Cell | None = None
-    outside: tuple[str, ...] = ()
-
-
-def measure_cell(work: Measurement, context: Context, needed: Needed) -> Outcome:
-    """Measure the trajectory, and write energies of each frame and other curves beside it."""
     if "roll-outs" not in context.memo:
-        context.memo["roll-outs"] = roll_outs_of(work, context, needed)
-    roll_out, folder = context.memo["roll-outs"][work.cell], context.folder
-    if work.counterpart is not None:
-        outcome = needed.get(work.counterpart.task_id)
-        if outcome is not None and outcome.status in USABLE:
-            roll_out.counterpart = _positions(folder.trajectory_path(*work.counterpart.key))
-    metrics, curves, (status, reason) = measured(roll_out, work.cell.scene.metrics, work.outside)
-    path = folder.curves_path(*work.cell.key)
+        context.memo["roll-outs"] = roll_outs_of(cells, gap_samples, context, needed)
+    roll_out, folder = context.memo["roll-outs"][cell], context.folder
+    if cell.scene.counterpart:
+        other = replace(cell, scene=replace(cell.scene, name=cell.scene.counterpart))
+        if needed.get(other.task_id, Outcome("skipped")).status in USABLE:
+            roll_out.counterpart = _positions(folder.trajectory_path(*other.key))
+    metrics, curves, (status, reason) = measured(roll_out, cell.scene.metrics, outside)
+    path = folder.curves_path(*cell.key)
     if curves:
         curves[SECONDS] = np.array(roll_out.trajectory.times[: len(roll_out.positions)], dtype=float)
         curves[SECONDS][: roll_out.scene.warm_up] = np.nan
@@ -61,16 +53,18 @@ def measure_cell(work: Measurement, context: Context, needed: Needed) -> Outcome
     return Outcome(status, reason, result=metrics, files=(folder.relative(path),))
 
 
-def roll_outs_of(work: Measurement, context: Context, needed: Needed) -> dict[Cell, RollOut]:
-    """Return the roll-outs of the batch: they share search trees, and the energies of references."""
+def roll_outs_of(
+    cells: tuple[Cell, ...], gap_samples: int, context: Context, needed: Needed
+) -> dict[Cell, RollOut]:
+    """Return the roll-outs of a scene's cells."""
     from reference_sim import Trajectory
 
-    folder = context.folder
-    group = SceneRollOuts(build_scene(work.cell.scene, context), gap_samples=work.gap_samples)
-    if work.quasi_static in needed:
-        group.quasi_static = _positions(folder.quasi_static_path(work.cell.scene.name))
+    folder, scene = context.folder, cells[0].scene
+    group = SceneRollOuts(build_scene(scene, context), gap_samples=gap_samples)
+    if quasi_static_id(scene) in needed:
+        group.quasi_static = _positions(folder.quasi_static_path(scene.name))
     roll_outs = {}
-    for cell in work.cells:
+    for cell in cells:
         outcome = needed.get(cell.task_id)
         if outcome is not None and outcome.files:
             still = folder.quasi_static_path(*cell.key) if len(outcome.files) > 1 else None
@@ -82,6 +76,11 @@ def roll_outs_of(work: Measurement, context: Context, needed: Needed) -> dict[Ce
             if not cell.entry.other_mesh:  # others are measured together, vertex by vertex
                 group.roll_outs.append(roll_outs[cell])
     return roll_outs
+
+
+def quasi_static_id(scene: Scene) -> TaskId:
+    """Return the id of the task that simulates each frame of a scene held still."""
+    return "quasi-static", flat(scene.name)
 
 
 def measured(

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from benchmarks.assets import Assets
-    from benchmarks.training import Training
+    from benchmarks.plan.plan import Network
     from snug.motion.motion import Motion
     from snug.networks.trained_model import TrainedModel
 
@@ -40,10 +40,8 @@ class NetworkTraining:
     """Training of a network, or an untrained one.
 
     Attributes:
-        training: its name.
-        chosen: how it is trained; None: not at all.
-        home: what has to be loaded before, as the file that declares an energy of its recipe.
-        seed, garment, steps: of the network.
+        network: its name, seed, garment and declared training.
+        steps: of the training.
         motions: what it learns from.
         held_out: motions that stop it, where it goes on until it has converged.
         simulated: motion -> the task that simulates it, where it learns from simulations.
@@ -54,11 +52,7 @@ class NetworkTraining:
             killed goes on from its last checkpoint, and ends as it would have.
     """
 
-    training: str
-    chosen: Training | None
-    home: str = ""
-    seed: int
-    garment: str
+    network: Network
     steps: int
     motions: tuple[str, ...]
     held_out: tuple[str, ...] = ()
@@ -76,11 +70,12 @@ class NetworkTraining:
     @property
     def work(self) -> float:
         """Expected duration, in steps of SNUG's network."""
-        return self.steps * KINDS[self.chosen.kind].cost if self.chosen else 0.0
+        training = self.network.training
+        return self.steps * KINDS[training.kind].cost if training else 0.0
 
     def path(self, folder: RunFolder) -> Path:
         """Return the path of the trained model."""
-        return model_path(folder.models_of(self.garment), self.training, self.seed)
+        return model_path(folder.models_of(self.network.garment), self.network.name, self.network.seed)
 
 
 def train(job: NetworkTraining, context: Context, needed: Needed) -> Outcome:
@@ -94,12 +89,13 @@ def train(job: NetworkTraining, context: Context, needed: Needed) -> Outcome:
     from snug.training.validation import Validation
 
     torch.set_num_threads(1)
-    if job.home:
-        load(job.home)
+    network, training = job.network, job.network.training
+    if network.declared_in:  # as of an energy of its recipe
+        load(network.declared_in)
     assets, run = context.assets, context.folder
     assert assets is not None
     path = job.path(run)
-    dressed = DressedBody(assets.body, assets.garments[job.garment])
+    dressed = DressedBody(assets.body, assets.garments[job.network.garment])
     motions, targets = job.motions, None
     mixed: list[Motion] = []
     if job.simulated:
@@ -118,12 +114,12 @@ def train(job: NetworkTraining, context: Context, needed: Needed) -> Outcome:
         path=path.with_name(f".{path.stem}.checkpoint.safetensors"), minutes=CHECKPOINT_MINUTES,
         resume=True, key=digest([job.key, targets]),
     )  # fmt: skip
-    if job.chosen is None:
-        model = untrained_model("snug", dressed, assets.named(motions), seed=job.seed)
+    if training is None:
+        model = untrained_model("snug", dressed, assets.named(motions), seed=job.network.seed)
     else:
         model = train_network(
-            job.chosen.kind, dressed, [*assets.named(motions), *mixed], steps=job.steps,
-            seed=job.seed, trajectories=targets, recipe=job.chosen.recipe, progress=False,
+            training.kind, dressed, [*assets.named(motions), *mixed], steps=job.steps,
+            seed=job.network.seed, trajectories=targets, recipe=training.recipe, progress=False,
             every=EVERY, device=job.device, checkpoint=checkpoint, validation=validation,
         )  # fmt: skip
     model.origin = origin_of(job, needed, left_out=[name for name in job.motions if name not in motions])
@@ -135,10 +131,11 @@ def train(job: NetworkTraining, context: Context, needed: Needed) -> Outcome:
 
 def origin_of(job: NetworkTraining, needed: Needed, *, left_out: list[str]) -> dict[str, Any]:
     """Return what the file of the model says of its training; left_out: motions without simulation."""
-    simulated = job.chosen.simulated if job.chosen else None
+    training = job.network.training
+    simulated = training.simulated if training else None
     return {
-        "network": job.training,
-        "garment": job.garment,
+        "network": job.network.name,
+        "garment": job.network.garment,
         "motions": [name for name in job.motions if name not in left_out],
         "held_out": list(job.held_out),
         "simulated_by": simulated.method if simulated else "",
@@ -166,7 +163,7 @@ def mixed_clips(
             vertices_of |= read_arrays(folder.path / needed[id].files[0])
     if twice := sorted(vertices_of.keys() & set(job.motions)):
         raise ValueError(f"training motion {twice[0]!r}: a mixed clip is called so: rename its file")
-    vertices = len(assets.garments[job.garment].rest_positions)
+    vertices = len(assets.garments[job.network.garment].rest_positions)
     clips = make_shared_clips(assets.named(job.motions), len(job.clips), vertices=vertices)
     return [clip for clip in clips if clip.name in vertices_of], vertices_of
 
@@ -198,7 +195,7 @@ def pretrained_network(job: NetworkTraining, folder: Path) -> tuple[Path | None,
 
     Where there is none, or one of another training, why it cannot be taken.
     """
-    name = network_name(job.training, job.garment, job.seed)
+    name = network_name(job.network.name, job.network.garment, job.network.seed)
     places = (folder / f"{name}{SUFFIX}", job.path(RunFolder(folder)))
     path = next((path for path in places if path.is_file()), None)
     if path is None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from benchmarks import provenance
 from benchmarks.metrics import declared, find_metric
-from benchmarks.plan.plan import Plan, runs
+from benchmarks.plan.plan import Plan
 from benchmarks.provenance import digest, digest_of_file
 from benchmarks.results import run_folder
 from benchmarks.results.protocol import DIGEST, NUMBER
@@ -25,8 +25,7 @@ from snug.trained import FOLDER
 if TYPE_CHECKING:
     from benchmarks.assets import Assets
 
-KEPT = ("command", "commit", "started", "finished", "stages")  # of an earlier run in the folder
-OF_ROWS = ("metrics", "methods", "scenes", "cases", "digests", "tasks", "cells")
+OF_ROWS = ("metrics", "methods", "scenes", "cases", "digests", "tasks")
 
 
 class RunLog:
@@ -47,7 +46,6 @@ class RunLog:
         self.rows: list[Row] = []
         self.stages: list[dict[str, Any]] = []
         before = self.folder.read_config() if self.folder.config_path.is_file() else {}
-        runs_before = [{name: before.get(name) for name in KEPT}] if before else []
         self.config: dict[str, Any] = {
             "command": plan.command,
             "study": dict(plan.study),
@@ -75,8 +73,6 @@ class RunLog:
             "versions": provenance.versions(),
             "preset_values": dataclasses.asdict(plan.preset),
             "stages": self.stages,
-            # Earlier runs in this folder: their stages are the times of what this one reuses.
-            "earlier": [*(before.get("earlier") or []), *runs_before],
             "test_looks": before.get("test_looks") or [],
             # What the rows there mean, until there are others.
             **{name: before[name] for name in OF_ROWS if name in before},
@@ -130,9 +126,7 @@ class RunLog:
                 failed = {"failed": f"{outcome.status}: {outcome.reason}"} if outcome.failed else {}
                 facts = {**outcome.result, **failed, "wall_seconds": round(outcome.seconds, 3)}
                 of_kind.setdefault(task.stage, {})[task.label] = facts
-        outcomes = [runner.outcomes["cell", cell.name] for cell in self.plan.cells if runs(cell)]
-        cells = {"run": len(outcomes), "failed": sum(outcome.failed for outcome in outcomes)}
-        self.config |= {"tasks": of_kind, "cells": cells}
+        self.config["tasks"] = of_kind
         for outcome in runner.outcomes.values():
             self.config["digests"] |= outcome.digests
         self.folder.write_config(self.config)

@@ -37,7 +37,7 @@ from benchmarks.runner.ground_truth import (
     simulate_motion,
     simulate_quasi_static,
 )
-from benchmarks.runner.measurements import Measurement, measure_cell
+from benchmarks.runner.measurements import measure_cell, quasi_static_id
 from benchmarks.runner.networks import (
     LONGEST,
     NetworkTraining,
@@ -187,7 +187,7 @@ class Schedule:
             "kind": "network", "name": network.task_id[1], "label": network.label, "silent": True,
             "files": (self.folder.relative(job.path(self.folder)),),
         }  # fmt: skip
-        if self.plan.trained is not None and job.chosen is not None:
+        if self.plan.trained is not None and network.training is not None:
             source, refusal = pretrained_network(job, self.plan.trained)
             if source or not network.users_training:
                 return Task(
@@ -208,8 +208,7 @@ class Schedule:
         inputs = digests_of(self._inputs_of(network))
         code = software(*RUNNING, *users_code(network.declared_in))
         return NetworkTraining(
-            training=network.name, chosen=network.training, home=network.declared_in, seed=network.seed,
-            garment=network.garment, steps=self._steps(network), motions=motions, held_out=held_out,
+            network=network, steps=self._steps(network), motions=motions, held_out=held_out,
             simulated=dict(zip((*motions, *held_out), ids)), device=self.plan.device,
             clips=tuple(task.id for task in truth if task.kind == "clips"),
             inputs=inputs, key=digest(inputs | code),
@@ -296,9 +295,9 @@ class Schedule:
     def quasi_static(self, scene: Scene) -> Task:
         """Return the task that simulates each frame of a scene held still."""
         return Task(
-            kind="quasi-static", name=flat(scene.name), label=scene.name, stage="quasi-static answers",
-            silent=True, run=partial(simulate_quasi_static, scene), needs=(start_of(scene),),
-            **self._of_scene(scene),
+            kind="quasi-static", name=quasi_static_id(scene)[1], label=scene.name,
+            stage="quasi-static answers", silent=True, run=partial(simulate_quasi_static, scene),
+            needs=(start_of(scene),), **self._of_scene(scene),
         )  # fmt: skip
 
     def metrics(self, cell: Cell) -> Task:
@@ -309,15 +308,10 @@ class Schedule:
         reads = tuple(other.task_id for other in compared if other != cell)
         if scene.simulated:
             reads = (*reads, start_of(scene))  # the scene is built from it
-        quasi_static, counterpart = None, None
         if scene.dynamic:
-            quasi_static = ("quasi-static", flat(scene.name))
-            reads = (*reads, quasi_static)
-        if scene.counterpart:
-            wanted = (scene.counterpart, cell.method, cell.seed)
-            same = (c for c in plan.cells if (c.scene.name, c.method, c.seed) == wanted)
-            if (counterpart := next(same, None)) is not None:
-                reads = (*reads, counterpart.task_id)
+            reads = (*reads, quasi_static_id(scene))
+        wanted = (scene.counterpart, cell.method, cell.seed)
+        reads += tuple(c.task_id for c in plan.cells if (c.scene.name, c.method, c.seed) == wanted)
         of_scene = self._of_scene(scene, *MEASURING, *users_code(*plan.metrics))
         inputs = {
             "suites": sorted(cell.suites),
@@ -328,13 +322,10 @@ class Schedule:
             ],
             "metrics": scene.metrics,
         }  # fmt: skip
-        work = Measurement(
-            cell=cell, cells=cells, gap_samples=self.preset.gap_samples, quasi_static=quasi_static,
-            counterpart=counterpart, outside=plan.metrics,
-        )  # fmt: skip
+        run = partial(measure_cell, cell, cells, self.preset.gap_samples, plan.metrics)
         return Task(
             kind="metrics", name=cell.name, label=cell.label, stage="metrics",
-            run=partial(measure_cell, work), needs=(cell.task_id,), reads=reads, batch=scene.name,
+            run=run, needs=(cell.task_id,), reads=reads, batch=scene.name,
             files=(self.folder.relative(self.folder.curves_path(*cell.key)),),
             inputs=of_scene["inputs"] | inputs, code=of_scene["code"],
         )  # fmt: skip

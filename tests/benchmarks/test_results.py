@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import dataclasses
-import os
 
-import numpy as np
 import pytest
 
 from benchmarks.results import run_folder
 from benchmarks.results.protocol import NUMBER, OWN
-from benchmarks.results.row import COLUMNS, ResultsError, Row, with_provenance
-from benchmarks.results.run_folder import FORMAT, RunFolder
-from reference_sim import Trajectory
+from benchmarks.results.row import COLUMNS, ResultsError, Row
+from benchmarks.results.run_folder import RunFolder
 from reports.finished_run import read_run
 
 ROWS = [
@@ -105,12 +102,6 @@ def test_a_file_that_is_absent_or_broken_is_named(tmp_path, name, text, word):
     assert text is not None or not folder.path.exists()
 
 
-def test_config_comes_back(tmp_path):
-    folder = RunFolder(tmp_path)
-    folder.write_config({"preset": "smoke", "seeds": [0, 1], "note": "λ"})
-    assert folder.read_config() == {"format": FORMAT, "preset": "smoke", "seeds": [0, 1], "note": "λ"}
-
-
 def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(tmp_path):
     folder = RunFolder(tmp_path)
     folder.write_rows(ROWS[:1])
@@ -123,39 +114,3 @@ def test_a_write_that_fails_leaves_the_old_file_and_nothing_else(tmp_path):
         folder.write_rows(rows())
     assert folder.read_rows() == ROWS[:1]
     assert [path.name for path in tmp_path.iterdir()] == ["results.csv"]
-
-
-def test_what_lies_under_a_part_files_name_is_not_followed(tmp_path):
-    """Links under the names of part files, as somebody else may leave them in a folder that all can write."""
-    other = tmp_path / "other"
-    other.write_text("precious")
-    sheet = Trajectory(np.zeros((2, 3, 3)), np.array([[0, 1, 2]]), np.array([0.0, 0.1]))
-    (tmp_path / f".results.{os.getpid()}.part.csv").symlink_to(other)
-    (tmp_path / "a.vtkhdf.part").symlink_to(other)
-    RunFolder(tmp_path).write_rows(ROWS)
-    sheet.save(tmp_path / "a.vtkhdf")
-    assert other.read_text() == "precious"
-    assert len(RunFolder(tmp_path).read_rows()) == len(ROWS)
-    assert (Trajectory.load(tmp_path / "a.vtkhdf").positions == sheet.positions).all()
-
-
-def test_trajectory_paths_are_flat_and_told_apart(tmp_path):
-    folder = RunFolder(tmp_path)
-    paths = {folder.trajectory_path(s, m, k) for s in ("a/b", "a") for m in ("x", "y") for k in (0, 1)}
-    assert len(paths) == 8 and all(len(p.relative_to(tmp_path).parts) == 3 for p in paths)
-
-
-def test_a_row_of_an_earlier_run_keeps_where_it_comes_from():
-    earlier = [dataclasses.replace(row, commit="old", hardware="another") for row in ROWS]
-    filled = with_provenance(earlier, commit="new", preset="quick", hardware="this")
-    assert {(row.commit, row.preset, row.hardware) for row in filled} == {("old", "quick", "another")}
-
-
-def test_an_energy_that_a_scene_does_not_have_is_not_a_number(tmp_path):
-    path = RunFolder(tmp_path).frame_energies_path
-    path.write_text(HEAD + "kick,snug,2,0.1,,3\n")
-    table = run_folder.read_frame_energies(path)
-    ((scene, method, seed, seconds, strain, total),) = table.values.tolist()
-    assert (scene, method, seed, seconds, total) == ("kick", "snug", 2, 0.1, 3.0) and strain != strain
-    assert list(table)[4:] == ["strain", "total"]
-    assert list(map(str, table.dtypes[2:])) == ["int64", *3 * ["float64"]]

@@ -117,7 +117,6 @@ def test_what_is_unchanged_is_cached_and_what_is_edited_is_done_again(done, file
         lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("  cell")]
         return {line.split(":")[0].split()[-1] for line in lines if not line.endswith(": cached")}
 
-    (files / "mine_helper.py").write_text(HELPER.format(shift=0.0) + "# a remark\n")
     assert stale() == set()
     (files / "theirs_run.py").write_text(PROGRAM + "# of what is run elsewhere every byte counts\n")
     assert stale() == {"theirs"}
@@ -206,7 +205,8 @@ def test_a_method_brings_the_training_of_its_network(tmp_path):
     )  # fmt: skip
     (task,) = (task for task in Schedule(plan).tasks() if task.kind == "network")
     job = Schedule(plan).training(plan.networks[0])
-    assert (job.chosen, job.home, job.steps) == (Training("snug", recipe), home, TINY.steps["snug"])
+    assert job.network.training == Training("snug", recipe)
+    assert (job.network.declared_in, job.steps) == (home, TINY.steps["snug"])
     assert home in task.code and home in Schedule(plan).cell(cell).code
     other = dataclasses.replace(entry, name="b", training=Training("snug", DEFAULT))
     for wrong in ([entry, other], [dataclasses.replace(entry, trained="snug")]):

@@ -13,7 +13,7 @@ from benchmarks.methods import find_method
 from benchmarks.methods.declared_networks import TRAININGS
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.plan.cell import Cell
-from benchmarks.plan.plan import Plan
+from benchmarks.plan.plan import Network, Plan
 from benchmarks.presets import Preset, find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
@@ -57,10 +57,10 @@ def assets_of(dressed, motion) -> Assets:
 
 def training(name: str, *motions: str, steps: int, key: str = "0", device: str = "cpu") -> NetworkTraining:
     """The training of a network of the T-shirt."""
+    simulated = name in TRAININGS and TRAININGS[name].simulated
     return NetworkTraining(
-        training=name, seed=0, garment="tshirt", steps=steps,
-        chosen=TRAININGS.get(name), motions=motions, device=device, inputs={"key": key}, key=key,
-        simulated={m: ("data", m) for m in motions if name in TRAININGS and TRAININGS[name].simulated},
+        network=Network(name, 0, "tshirt"), steps=steps, motions=motions, device=device,
+        inputs={"key": key}, key=key, simulated={m: ("data", m) for m in motions if simulated},
     )  # fmt: skip
 
 

@@ -215,25 +215,19 @@ def test_a_dry_run_tells_what_is_there(tmp_path):
 # --- repeats -----------------------------------------------------------------------------------------------
 
 
-def watch(monkeypatch, calls: list, *names: str) -> None:
-    """Write down what is asked of the executor: the name, and the task or process."""
-    for name in names:
-        inner = getattr(InProcess, name)
-
-        def watched(self, first, *rest, name=name, inner=inner):
-            calls.append((name, first))
-            return inner(self, first, *rest)
-
-        monkeypatch.setattr(InProcess, name, watched)
-
-
 def test_repeats_take_turns_and_are_kept(tmp_path, monkeypatch):
     preset = dataclasses.replace(TINY, repeats=3, repeat_seconds=60.0)
     plan = plan_of(tmp_path, "simulation", "newton-1", "newton-4", preset=preset, how="still")
     calls: list = []
-    watch(monkeypatch, calls, "alone")
+    alone = InProcess.alone
+
+    def watched(self, task, needed):
+        calls.append(task)
+        return alone(self, task, needed)
+
+    monkeypatch.setattr(InProcess, "alone", watched)
     runner = finish(plan)
-    repeats = [task.label.split(" x ")[1] for _, task in calls if task.kind == "repeat"]
+    repeats = [task.label.split(" x ")[1] for task in calls if task.kind == "repeat"]
     assert repeats == ["newton-1", "newton-4", "simulation", "newton-4", "simulation", "newton-1"]
     cell = plan.cells[0]
     ids = [cell.task_id, cell.repeat_id(1), cell.repeat_id(2)]
@@ -244,17 +238,6 @@ def test_repeats_take_turns_and_are_kept(tmp_path, monkeypatch):
     calls.clear()
     again = finish(plan)
     assert calls == [] and clock_costs(cell, 3, again.outcomes)[0] == costs
-
-
-def test_a_process_ends_when_none_of_its_cells_repeats_will_come(tmp_path, monkeypatch):
-    preset = dataclasses.replace(TINY, repeats=3, repeat_seconds=0.0)
-    plan = plan_of(tmp_path, "simulation", "newton-1", preset=preset)
-    calls: list = []
-    watch(monkeypatch, calls, "alone", "release")
-    finish(plan)
-    one, other = (cell.name for cell in plan.cells)
-    order = [(name, getattr(first, "process", first)) for name, first in calls[:4]]
-    assert order == [("alone", one), ("release", one), ("alone", other), ("release", other)]
 
 
 def test_a_repeat_that_fails_is_said_on_the_rows(tmp_path):

@@ -187,7 +187,7 @@ def test_a_training_of_equal_data_has_the_steps_and_clips_that_it_declares(tmp_p
     alone = dataclasses.replace(plan, motions=Motions(train=("walk",), test=("kick",)))
     network = Network("snug", 0, "tshirt", find_method("snug-data-converged-0").training)
     task = Schedule(alone).training(network)  # a single motion cannot be held out
-    assert task.motions == ("walk",) and task.held_out == () and task.chosen.converged
+    assert task.motions == ("walk",) and task.held_out == () and network.training.converged
 
 
 @pytest.mark.parametrize("kind", [pytest.param("snug", marks=pytest.mark.slow), "supervised"])
@@ -203,8 +203,9 @@ def test_a_training_goes_on_until_held_out_motions_get_no_better(tmp_path, monke
         still(dataclasses.replace(clip, name="still_1"), None).save(path)
         needed["data", clip.name] = ground_truth.Outcome(result={"whole": True}, files=(path.name,))
     task = dataclasses.replace(
-        training("supervised", "given", steps=200), chosen=entry.training, training=entry.trained,
-        held_out=("held",), simulated={id[1]: id for id in needed} if kind == "supervised" else {},
+        training("supervised", "given", steps=200), held_out=("held",),
+        network=Network(entry.trained, 0, "tshirt", entry.training),
+        simulated={id[1]: id for id in needed} if kind == "supervised" else {},
     )  # fmt: skip
     values = iter([5.0, 3.0, *[4.0] * 200])
     monkeypatch.setattr("snug.training.validation.Validator.value", lambda self: next(values))

@@ -15,7 +15,7 @@ from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.results.row import Row
 from benchmarks.runner.cells import judge
-from benchmarks.runner.execute_plan import accepted, summary
+from benchmarks.runner.execute_plan import accepted
 from benchmarks.runner.rows import clock_costs, rows_of
 from benchmarks.runner.run_json import RunLog
 from benchmarks.runner.schedule import tasks_of
@@ -111,17 +111,6 @@ def test_inputs_are_added_to_a_methods_own_work_and_percentiles_are_medians_of_r
     assert costs["cost/frame_p95"] == pytest.approx(400.0) and remark == ""
 
 
-def test_rows_carry_what_scene_and_method_declare():
-    scene = dressed_scene("kick", part="clip")
-    (row, *_) = rows(Cell(scene, find_method("snug+lbfgs-4"), 1, ("speed",)), RAN, {"energy/strain": 1.0})
-    assert (row.garment, row.motion, row.part) == ("tshirt", "kick", "clip")
-    assert (row.role, row.family, row.level, row.base) == ("warm-started", "snug+lbfgs", 4.0, "snug")
-    assert row.seeded and row.pairing_group == "snug" and row.seed == 1
-    (row, *_) = rows(Cell(SHEET, find_method("vbd-20"), 0, ("speed",)), RAN, {"energy/strain": 1.0})
-    assert (row.garment, row.motion, row.part, row.base) == ("", "", "", "")
-    assert (row.role, row.family, row.level, row.seeded) == ("solver", "vbd", 20.0, False)
-
-
 def test_an_extreme_case_may_fail_honestly_and_nothing_else_may():
     def row(suite, status, reason="why"):
         return Row(suite, "s", "m", 0, "x", "1", None, status, reason)
@@ -129,27 +118,6 @@ def test_an_extreme_case_may_fail_honestly_and_nothing_else_may():
     assert accepted(row("extremes", "stalled")) and accepted(row("garments", "skipped"))
     assert not accepted(row("extremes", "failed")) and not accepted(row("garments", "stalled"))
     assert not accepted(row("extremes", "stalled", ""))
-
-
-def test_the_last_line_counts_the_endings_of_every_suite():
-    rows = [Row(suite, "c", "simulation", 0, "check", "1", 0.0) for suite in ("validation", "extremes")]
-    rows += [dataclasses.replace(rows[1], status="failed", reason="why")] * 2
-    stages = [{"name": name, "seconds": 60.0 + k} for k, name in enumerate(("a", "b", "c", "d", "a"))]
-    last = "validation: 1 ok; extremes: 1 ok, 2 failed; time: 310 s (a 124 s, d 63 s, c 62 s)"
-    assert summary(rows, stages) == last
-
-
-@pytest.mark.parametrize(
-    ("reason", "declared", "pretrained"),
-    [
-        ("declared by its author, not measured", True, ""),
-        ("its network learned without a; pretrained network n of 1", False, "pretrained network n of 1"),
-        ("no pretrained network n: train it", False, ""),
-    ],
-)
-def test_what_a_reason_says_of_times_and_networks_has_one_definition(reason, declared, pretrained):
-    row = Row("garments", "s", "mine", 0, "cost/frame", "ms", None, "skipped", reason)
-    assert (row.declared, row.pretrained) == (declared, pretrained)
 
 
 def test_the_accelerator_is_on_the_rows_of_training_alone(tmp_path, monkeypatch):

@@ -14,22 +14,16 @@ from pathlib import Path
 import pytest
 
 from benchmarks import run
-from benchmarks.methods import find_method
-from benchmarks.plan.cell import Cell
-from benchmarks.plan.motions import Motions
-from benchmarks.plan.plan import Network
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution
-from benchmarks.runner.cache import Cache, dependencies
+from benchmarks.runner.cache import dependencies
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.rows import rows_of
 from benchmarks.runner.run_json import RunLog
-from benchmarks.runner.schedule import Schedule, tasks_of
-from benchmarks.runner.task import Outcome
-from benchmarks.scenes import of_garment
+from benchmarks.runner.schedule import tasks_of
 from benchmarks.validation.case import Case
 from benchmarks.validation.registry import CASES, KNOWN_ANSWERS, STRESS_TESTS
-from tests.benchmarks.runner.tasks_by_hand import TINY, InProcess, finish, plan_of, run_in_this_process
+from tests.benchmarks.runner.tasks_by_hand import InProcess, finish, plan_of, run_in_this_process
 from tests.benchmarks.runner.test_cells import of_session
 from tests.benchmarks.runner.test_tasks import task
 
@@ -85,11 +79,6 @@ def test_a_second_run_in_the_same_folder_is_refused_in_one_line(tmp_path, monkey
     assert not (tmp_path / "run").exists()  # nothing was written there
 
 
-def test_a_folder_of_an_earlier_version_is_refused_in_one_line(tmp_path, refused):
-    (tmp_path / "run.json").write_text('{"command": "python -m benchmarks.run", "finished": null}')
-    assert "new folder" in refused("earlier version", run.main, words_of(tmp_path, "simulation"))
-
-
 def test_what_a_killed_run_was_writing_is_removed_and_a_fresh_one_goes_on_from_no_training(tmp_path):
     scene, models = tmp_path / "trajectories" / "free_fall", tmp_path / "models" / "tunic"
     for folder in (scene, models):
@@ -137,56 +126,10 @@ def test_an_interrupted_continuation_keeps_the_rows_of_what_is_finished(tmp_path
     assert before and RunFolder(tmp_path).read_rows() == before
 
 
-def test_an_interrupt_knows_which_simulations_have_failed(tmp_path):
-    scene = of_garment("tshirt").scene("kick").at(TINY)
-    cell = Cell(scene, find_method("supervised"), 0, ("garments",))
-    motions = Motions(train=("walk", "run"), test=("kick",))
-    plan = plan_of(tmp_path, motions=motions, cells=(cell,))
-    cache, entries = Cache(RunFolder(tmp_path)), {}
-    by_id = {t.id: t for t in tasks_of(plan)}
-    lost = Outcome("diverged", "far away", failed=True)
-    killed = Outcome("failed", "killed", failed=True)
-    network = Schedule(plan).network(Network("supervised", 0, "tshirt")).id
-    for id, outcome in (
-        (("start", "tshirt-kick"), Outcome()), (("data", "tshirt-walk/simulation"), Outcome()),
-        (("data", "tshirt-run/simulation"), lost), (network, Outcome()), (("cell", cell.name), killed),
-    ):  # fmt: skip
-        entries[id] = cache.keep(by_id[id], outcome, entries)
-    runner = Runner(tasks_of(plan), Cache(RunFolder(tmp_path), retry=True))
-    (row,) = rows_of(plan, runner.tasks, runner.known())
-    assert (row.method, row.status, row.reason) == ("supervised", "failed", "killed")
-    assert runner.outcomes["data", "tshirt-run/simulation"].reason == "far away"
-
-
 def test_a_failed_task_that_no_row_speaks_of_makes_the_exit_status_1(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(execution, "tasks_of", lambda plan: [task("lame", "raise")])
     assert execution.execute(plan_of(tmp_path)) == 1
     assert "network lame: failed: ValueError: broken on purpose" in capsys.readouterr().err
-
-
-HANGING = """
-import sys
-from pathlib import Path
-from benchmarks.runner.execute_plan import held
-from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.isolated_process import TaskProcess
-from tests.benchmarks.runner.test_tasks import task
-with held(Path(sys.argv[1])):
-    process = TaskProcess(RunFolder(Path(sys.argv[1])), None)
-    process.do(task("first"), {})
-    print("begun")
-    process.do(task("hangs", "pause"), {})
-"""
-
-
-@pytest.mark.slow
-def test_a_killed_run_holds_its_folder_no_longer_and_its_processes_end(tmp_path, monkeypatch):
-    process = start(["-c", HANGING, str(tmp_path)])
-    assert process.stdout is not None and process.stdout.readline() == b"begun\n"
-    monkeypatch.setattr(execution, "execute", lambda plan, assets, **_: 0)
-    assert run.main(words_of(tmp_path, "simulation")) == 2
-    kill(process)
-    assert run.main(words_of(tmp_path, "simulation")) == 0
 
 
 @pytest.mark.slow
@@ -208,8 +151,6 @@ def test_a_killed_run_loses_the_running_cell_alone(tmp_path):
     assert {row.method for row in first} == {"simulation", "newton-1", "newton-4"}
     assert run.main(options) == 0
     assert RunFolder(out).read_rows() == first
-    config = RunFolder(out).read_config()
-    assert len(config["earlier"]) == 2 and config["clock"]["threads"] == 1
     assert not [path for path in out.rglob("*") if "part" in path.name]
 
 
