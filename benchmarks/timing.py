@@ -9,7 +9,6 @@ had kept.
 
 from __future__ import annotations
 
-import ctypes
 import gc
 import multiprocessing
 import os
@@ -163,14 +162,3 @@ def peak_memory() -> float:
         pass  # not Linux
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
     return peak * (1 if sys.platform == "darwin" else 1024) / 1e6
-
-
-def give_back() -> None:
-    """Free unused memory, and let the C library return it to the system, where it keeps it (glibc).
-
-    A simulation refers to itself: it stays until Python looks for such circles.
-    """
-    gc.collect()
-    trim = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
-    if trim is not None:
-        trim(0)

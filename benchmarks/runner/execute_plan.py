@@ -50,19 +50,12 @@ def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) ->
     tasks = tasks_of(plan)
     log = RunLog(plan)
     runner = Runner(tasks, log.cache)
-    try:
-        if plan.garments:
-            try:
-                assets = log.open_assets(assets)
-            except ValueError as error:  # all dressed scenes fail, for the same reason; the others go on
-                runner.refuse(("start", "data", "clips", "network"), one_line(error))
-        runner.run(executor_of(plan, log.folder, assets), log)
-    except (KeyboardInterrupt, RunStopped):
-        log.note("interrupted", True)
-        rows = rows_of(plan, runner.tasks, runner.known())
-        if rows or not log.folder.rows_path.is_file():  # nothing known is no reason to lose a table
-            log.write_rows(rows)
-        raise
+    if plan.garments:
+        try:
+            assets = log.open_assets(assets)
+        except ValueError as error:  # all dressed scenes fail, for the same reason; the others go on
+            runner.refuse(("start", "data", "clips", "network"), one_line(error))
+    runner.run(executor_of(plan, log.folder, assets), log)
     rows = rows_of(plan, runner.tasks, runner.outcomes)
     log.write_rows(rows)
     log.note_outcomes(runner)
@@ -70,12 +63,10 @@ def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) ->
     answer = make_report(log) if report else ""
     print(*filter(None, (answer, summary(log.rows, log.stages))), sep="\n", flush=True)
     failed = [row for row in log.rows if not accepted(row)]
-    broken = [f"{label}: {reason}" for label, reason in runner.broken().items()]
     ends = dict.fromkeys(f"{row.scene} x {row.method}: {row.status}: {row.reason}" for row in failed)
-    lines = [*ends, *broken]
-    if len(lines) > MOST_FAILURES:
-        more = f"and {len(lines) - MOST_FAILURES} more in results.csv and run.json"
-        lines = [*lines[:MOST_FAILURES], more]
+    lines = [*ends, *runner.broken()]
+    if failures := len(lines):
+        lines[MOST_FAILURES:] = ["more in results.csv and run.json"] * (failures > MOST_FAILURES)
     if runner.reused:
         lines.append(f"{len(runner.reused)} results taken from earlier runs in this folder")
     print(*lines, sep="\n", end="\n" if lines else "", file=sys.stderr)
@@ -83,7 +74,7 @@ def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) ->
         print(f"looks at the test motions from this folder: {len(looks)}", file=sys.stderr)
     if report and answer is not None:
         print(log.folder.report_path.resolve(), flush=True)
-    return 0 if answer is not None and not (failed or broken) else 1
+    return 0 if answer is not None and not failures else 1
 
 
 def executor_of(plan: Plan, folder: RunFolder, assets: Assets | None) -> Executor:

@@ -7,6 +7,7 @@ that what it has started ends with it; and it ends by itself when the parent doe
 
 from __future__ import annotations
 
+import gc
 import multiprocessing
 import os
 import signal
@@ -23,7 +24,6 @@ from typing import TYPE_CHECKING, Any
 from benchmarks.method import WorkerDied
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.task import Context, Needed, Outcome, RunStopped, Task, failure
-from benchmarks.timing import give_back
 
 if TYPE_CHECKING:
     from multiprocessing.context import BaseContext
@@ -218,8 +218,8 @@ def warm_up(context: Context, compile_kernels: Callable[[], None]) -> Outcome:
 
 
 def empty_memo(context: Context) -> Outcome:
-    """Empty the memo of this process and give back its memory."""
+    """Empty the memo of this process."""
     if context.memo:  # else there is no reason to look through all objects for garbage
         context.memo.clear()
-        give_back()
+        gc.collect()  # a simulation refers to itself
     return Outcome()

@@ -5,7 +5,7 @@ Dry run, resume, failures, what an interrupt leaves and exclusive timing are dec
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
 from typing import TYPE_CHECKING
 
@@ -154,20 +154,10 @@ class Runner:
             self.outcomes[task.id] = found.outcome or Outcome()
             yield task, found
 
-    def known(self) -> dict[TaskId, Outcome]:
-        """Return the outcomes so far, and those up to date in the folder of tasks that were not reached."""
-        self.cache.retry = False
-        for task in self.tasks:
-            if task.id not in self.outcomes:
-                found = self.cache.find(task, self.cached)
-                if found.outcome is not None:
-                    self.cached[task.id], self.outcomes[task.id] = found, found.outcome
-        return self.outcomes
-
-    def broken(self) -> Mapping[str, str]:
-        """Return title -> how it failed, of tasks that have no row."""
-        known = {task: self.outcomes[task.id] for task in self.tasks if task.id in self.outcomes}
-        return {t.title: outcome.ending for t, outcome in known.items() if t.silent and outcome.failed}
+    def broken(self) -> list[str]:
+        """Return how tasks failed that have no row."""
+        failed = (task for task in self.tasks if task.silent and self.outcomes[task.id].failed)
+        return [f"{task.title}: {self.outcomes[task.id].ending}" for task in failed]
 
 
 def _able(tasks: Sequence[Task], *, timed: bool) -> list[Task]:

@@ -40,8 +40,6 @@ def rows_of_cell(cell: Cell, plan: Plan, tasks: Mapping[TaskId, Task], outcomes:
     if outcome is None:
         return
     measured = outcomes.get(cell.metrics_id)
-    if outcome.files and measured is None:
-        return  # interrupted before it was measured
     trained, ids = network_tasks(cell, tasks)
     network = outcomes.get(trained, Outcome()) if trained else Outcome()
     taught_by = [outcomes[id] for id in ids if id in outcomes]

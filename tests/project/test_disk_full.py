@@ -92,7 +92,7 @@ def test_a_run_stops_in_one_line_and_goes_on(tmp_path, monkeypatch, capsys):
     (line,) = (line for line in errors.splitlines() if line.startswith("benchmarks.run: "))
     assert status == 1 and "Traceback" not in errors and line.endswith("the same command goes on from there")
     assert "simulation.vtkhdf: File too large" in line
-    assert folder.read_config()["interrupted"] and not list(folder.path.rglob("*.part*"))
+    assert folder.read_config()["finished"] is None and not list(folder.path.rglob("*.part*"))
     assert run.main([*arguments, str(folder.path)]) == 0
     rows, others = (
         [(r.metric, r.value, r.status) for r in made.read_rows() if "cost/" not in r.metric]
