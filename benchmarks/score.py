@@ -155,7 +155,7 @@ def plan_score(
         ValueError: one line for the first thing that cannot be met.
     """
     name, table = parse_roll_out(roll_out, named=False)
-    stored = read_study(options=[option(roll_out, "rollouts", {name: table})]).rollouts[name]
+    stored = read_study(options=[option("rollouts", {name: table})]).rollouts[name]
     if rest_mesh and stored.other_mesh:
         raise RollOutFileError("other-mesh compares with a scene: give --scene, not --rest-mesh")
     scenes = []

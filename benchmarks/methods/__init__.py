@@ -18,27 +18,8 @@ from __future__ import annotations
 
 from benchmarks.declarations import by_name
 from benchmarks.method import MethodEntry
-from benchmarks.methods import declared_networks
-from benchmarks.methods.declared_networks import EQUAL_DATA, network
+from benchmarks.methods.declared_networks import NETWORKS
 from benchmarks.methods.declared_solvers import SOLVERS
-
-# They run when they are named: further baselines, ablations of SNUG, post-processing, the bound.
-FURTHER_METHODS = (
-    *declared_networks.NETWORKS,
-    *declared_networks.HANDLES,
-    *declared_networks.FLOORS,
-    *declared_networks.RECIPES,
-    *declared_networks.POST_PROCESSED,
-    MethodEntry(
-        name="direct-optimisation",
-        label="Vertices optimised directly",
-        description="no network: the vertices of a whole clip optimised directly, the least energy found",
-        module="benchmarks.methods.lower_bounds:make_direct_optimisation",
-        needs_body=True,
-        gives_first_frame=True,
-        role="bound",
-    ),
-)  # fmt: skip
 
 METHODS = (
     MethodEntry(
@@ -57,16 +38,9 @@ METHODS = (
         dtype="float32",
         gives_first_frame=True,
     ),
-    network("untrained", "SNUG, untrained",
-            "the SNUG network with a random last layer (SNUG itself starts as skinning)",
-            role="baseline", timed=False),  # a frame of it costs what one of SNUG does
-    network("snug", "", "recurrent network trained on the energies alone (Santesteban et al. 2022)"),
-    network("supervised", "", "the SNUG network trained on simulated vertices instead"),
-    network("pbns", "", "static pose-space deformation trained on the energies (Bertiche et al. 2021)"),
-    *FURTHER_METHODS,
-    *EQUAL_DATA,
+    *NETWORKS,
     *SOLVERS,
-)  # fmt: skip
+)
 
 
 def find_method(name: str) -> MethodEntry:

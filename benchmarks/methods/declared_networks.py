@@ -1,4 +1,4 @@
-"""Networks as methods: baselines, ablations, equal data; and the trainings of all of them.
+"""Networks as methods, their ablations and bounds, in NETWORKS; and the trainings of all of them.
 
 No result depends on these lists, but on the training of its own network alone: a further line makes no
 finished network out of date.
@@ -56,17 +56,14 @@ def network(
     return MethodEntry(name=name, label=label or KINDS[name].label, description=description, **usual | fields)
 
 
-def _post_processed(entry: MethodEntry) -> MethodEntry:
-    """Return the entry of a network with collision post-processing behind it."""
-    return replace(
-        entry, name=f"{entry.name}+cleanup", label=f"{entry.label}, post-processed",
-        description=f"{entry.name}, then vertices within 2 mm of the skin pushed out; both are timed",
-        options={**entry.options, "cleanup": True}, batched=False,
-        reporting=replace(entry.reporting, base=entry.name),
-    )  # fmt: skip
-
-
-NETWORKS = (
+COUNTS = (20, 40, 80)  # of handles
+NAMED = (
+    network("untrained", "SNUG, untrained",
+            "the SNUG network with a random last layer (SNUG itself starts as skinning)",
+            role="baseline", timed=False),  # a frame of it costs what one of SNUG does
+    network("snug", "", "recurrent network trained on the energies alone (Santesteban et al. 2022)"),
+    network("supervised", "", "the SNUG network trained on simulated vertices instead"),
+    network("pbns", "", "static pose-space deformation trained on the energies (Bertiche et al. 2021)"),
     network("pbns-springs", "PBNS, springs", "PBNS with its own mass-spring material instead of StVK"),
     network("pbns-paper", "PBNS, paper's text", "PBNS with StVK, trained as SNUG by the paper's text",
             base="pbns", pairing_group="pbns"),
@@ -90,14 +87,12 @@ NETWORKS = (
             seeded=False, role="baseline"),
     network("snug-paper", "SNUG, paper's text", "SNUG by the paper's text, its closest points remembered",
             base="snug", pairing_group="snug"),
-)  # fmt: skip
-
-COUNTS = (20, 40, 80)
-HANDLES = tuple(
-    network(f"handles-{count}", f"{count} handles",
-            f"static network that moves the garment by {count} handles, trained on the energies",
-            reporting=Reporting(family="handles", level=count, pairing_group="handles"))
-    for count in COUNTS
+    *(
+        network(f"handles-{count}", "",
+                f"static network that moves the garment by {count} handles, trained on the energies",
+                reporting=Reporting(family="handles", level=count, pairing_group="handles"))
+        for count in COUNTS
+    ),
 )  # fmt: skip
 
 
@@ -136,8 +131,25 @@ FLOORS = (
     ),
 )  # fmt: skip
 
-POST_PROCESSED = tuple(_post_processed(network(name, "", "")) for name in ("snug", "supervised"))
+POST_PROCESSED = tuple(
+    replace(
+        network(name, "", ""), name=f"{name}+cleanup", label=f"{KINDS[name].label}, post-processed",
+        description=f"{name}, then vertices within 2 mm of the skin pushed out; both are timed",
+        options={"kind": name, "cleanup": True}, batched=False,
+        reporting=Reporting(base=name, pairing_group=name),
+    )
+    for name in ("snug", "supervised")
+)  # fmt: skip
 
+DIRECT_OPTIMISATION = MethodEntry(
+    name="direct-optimisation",
+    label="Vertices optimised directly",
+    description="no network: the vertices of a whole clip optimised directly, the least energy found",
+    module="benchmarks.methods.lower_bounds:make_direct_optimisation",
+    needs_body=True,
+    gives_first_frame=True,
+    role="bound",
+)
 
 _LABELS = {
     "no-noise": "first states of zero",
@@ -149,8 +161,6 @@ _LABELS = {
     "two-transitions": "inertia of two transitions",
     "springs": "springs instead of StVK",
 }
-
-
 RECIPES = tuple(
     network(
         f"snug-{recipe.name}", f"SNUG, {_LABELS.get(recipe.name, recipe.name.replace('-', ' '))}",
@@ -195,3 +205,5 @@ EQUAL_DATA = tuple(
     for converged, numbers in ((False, (0, 1, 3, 12)), (True, (0, 12)))
     for mixed in numbers
 )
+
+NETWORKS = (*NAMED, *FLOORS, *RECIPES, *POST_PROCESSED, DIRECT_OPTIMISATION, *EQUAL_DATA)

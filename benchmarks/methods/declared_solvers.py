@@ -43,8 +43,8 @@ def _truncated(
     )
 
 
-def warm_started(base: str, label: str, solver: str) -> tuple[MethodEntry, ...]:
-    """Declare steps from skinning, SNUG or a variant of it: "newton", "lbfgs" or "fast-lbfgs" goes on."""
+def _warm_started(base: str, label: str, solver: str) -> tuple[MethodEntry, ...]:
+    """Declare steps from skinning or SNUG: "newton", "lbfgs" or "fast-lbfgs" goes on."""
     trained = None if base == "skinning" else base
     return tuple(
         MethodEntry(
@@ -59,7 +59,7 @@ def warm_started(base: str, label: str, solver: str) -> tuple[MethodEntry, ...]:
             truncated=True,
             role="warm-started",
             reporting=Reporting(
-                family=f"{base}+{solver}", level=count, base=base, pairing_group="snug" if trained else ""
+                family=f"{base}+{solver}", level=count, base=base, pairing_group=trained or ""
             ),
         )
         for count in (1, 2, 4, 8)
@@ -149,9 +149,9 @@ SOLVERS = (
         "xpbd", "XPBD", "sweep", "position-based dynamics with our energies, {} a step",
         (10, 40, 160), method="benchmarks.methods.sweeps:XPBD",
     ),
-    *warm_started("skinning", "Skinning", "lbfgs"),
-    *warm_started("skinning", "Skinning", "newton"),
-    *warm_started("snug", "SNUG", "lbfgs"),
-    *warm_started("snug", "SNUG", "newton"),
-    *warm_started("snug", "SNUG", "fast-lbfgs"),
+    *_warm_started("skinning", "Skinning", "lbfgs"),
+    *_warm_started("skinning", "Skinning", "newton"),
+    *_warm_started("snug", "SNUG", "lbfgs"),
+    *_warm_started("snug", "SNUG", "newton"),
+    *_warm_started("snug", "SNUG", "fast-lbfgs"),
 )  # fmt: skip

@@ -122,24 +122,19 @@ class DirectOptimisation(Method):
         descent = make_minimiser(
             potential, "lbfgs", finish=False, max_iterations=ITERATIONS, memory=MEMORY, tolerance=TOLERANCE
         )
-        finite = settled = True
-        for _ in range(ROUNDS):
+        status, reason = "stalled", f"the sum was still falling after {ROUNDS} rounds"
+        for number in range(1, ROUNDS + 1):
             self.search(x)
             before = potential.value(x)
             result = descent.minimise(x)
-            finite = bool(np.isfinite(result.positions).all()) and result.status != "diverged"
-            if not finite:
+            if result.status == "diverged" or not np.isfinite(result.positions).all():
+                status, reason = "diverged", f"round {number}: {result.reason}"
                 break
             x = result.positions
             self.sums.append(result.energy)
-            settled = before - result.energy < FALL * abs(result.energy - self.carried)
-            if settled:
+            if before - result.energy < FALL * abs(result.energy - self.carried):
+                status, reason = "ok", ""
                 break
-        status, reason = "ok", ""
-        if not finite:
-            status, reason = "diverged", f"round {len(self.sums) + 1}: {result.reason}"
-        elif not settled:
-            status, reason = "stalled", f"the sum was still falling after {ROUNDS} rounds"
         frames = self.scene.frames
         return Trajectory(
             positions=x.reshape(frames, -1, 3),

@@ -43,22 +43,16 @@ class CollisionPostProcessing:
     """Push-out of a garment from a body that moves in a known way.
 
     Args:
-        rest_positions: (V, 3) [m] of the garment.
-        body_rest, body_faces: (B, 3) [m] and (G, 3) of the body in T-pose, which say what may touch what.
+        dressed: garment and body at rest, which say what may touch what.
         body_positions: (T, B, 3) [m] of each frame; any origin shared with the garment.
 
     Raises:
         ValueError: garment and body are nowhere near each other.
     """
 
-    def __init__(
-        self,
-        rest_positions: np.ndarray,
-        body_rest: np.ndarray,
-        body_faces: np.ndarray,
-        body_positions: np.ndarray,
-    ) -> None:
-        self.patch = Patch(rest_positions, body_rest, body_faces)
+    def __init__(self, dressed: DressedBody, body_positions: np.ndarray) -> None:
+        garment, body = dressed.garment, dressed.body
+        self.patch = Patch(garment.rest_positions, body.shaped(), body.faces)
         self.body = body_positions[:, self.patch.body_vertices].astype(np.float32)
         self._faces: np.ndarray | None = None  # found last, where the next search begins
 
@@ -92,12 +86,11 @@ class Network(Method):
         assert scene.dressed is not None
         self.model = TrainedModel.load(self.path)
         self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
-        body, garment = scene.dressed.body, scene.dressed.garment
-        self.dressed = DressedBody(body, garment)
+        self.dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
         if self.cleanup:
             assert scene.obstacle is not None
             positions = np.asarray(scene.obstacle.positions)
-            self.clean = CollisionPostProcessing(garment.rest_positions, body.shaped(), body.faces, positions)
+            self.clean = CollisionPostProcessing(self.dressed, positions)
             for frame in range(min(WARM_UP, len(positions))):
                 self.clean(np.asarray(scene.cloth.rest_positions), frame)
         self.frames = prepare_roll_out(

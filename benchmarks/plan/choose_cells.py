@@ -166,23 +166,23 @@ def _check_words(read: ReadStudy) -> None:
     """Raise StudyError for a word of a field that nothing has as its name."""
     study, methods, cases = read.study, list(read.methods), [case.name for case in read.cases]
 
-    def check(known: Sequence[str], words: Iterable[str], *field: str) -> None:
+    def check(field: str, known: Sequence[str], words: Iterable[str]) -> None:
         for word in words:
             if not matching(known, [word.removeprefix("!")]):
-                what, hint = field[-1].removesuffix("s"), ""
+                what, hint = field.rpartition(".")[2].removesuffix("s"), ""
                 if what == "scene" and "/" in word:
                     hint = " (scenes of a dressed body are validation and test motions: see test_motions)"
-                study.refuse(f"unknown {what} '{word}'; {nearest(word, known)}{hint}", *field)
+                raise StudyError(f"{field}: unknown {what} '{word}'; {nearest(word, known)}{hint}")
 
-    check([*read.scenes, *cases], study.scenes, "scenes")
-    check(methods, study.methods, "methods")
+    check("scenes", [*read.scenes, *cases], study.scenes)
+    check("methods", methods, study.methods)
     # Scenes that tailor a T-shirt themselves are none of a run with another garment.
     scenes = list({**read.scenes, **all_scenes((), ())})
     for name, part in study.parts.items():
         patterns = expanded((*part.scenes, *part.optional_scenes), read.motions)
-        check(scenes, patterns, "parts", name, "scenes")
-        check(methods, part.methods, "parts", name, "methods")
-        check([*cases, *SETS], part.cases, "parts", name, "cases")
+        check(f"parts.{name}.scenes", scenes, patterns)
+        check(f"parts.{name}.methods", methods, part.methods)
+        check(f"parts.{name}.cases", [*cases, *SETS], part.cases)
 
 
 def _check_user_scenes(scenes: Sequence[Scene], motions: Motions) -> None:

@@ -54,7 +54,7 @@ def make_plan(
             been created then.
 
     >>> from benchmarks.plan.study import option, read_study
-    >>> study = read_study("default", [option("", "scenes", "flag"), option("", "methods", "simulation")])
+    >>> study = read_study("default", [option("scenes", "flag"), option("methods", "simulation")])
     >>> [scene.name for scene in make_plan(study).scenes]
     ['flag']
     """
@@ -109,7 +109,7 @@ def read_files(study: Study, scenes: Sequence[Scene] = ()) -> ReadStudy:
     if garment and garment.name in {name.split("/")[0] for name in all_scenes("-", "-")}:
         raise StudyError(f"{garment.path}: the project has scenes of that name: give the file another name")
     if self_contact and not installed("ipctk"):
-        study.refuse("needs the package ipctk: pip install ipctk", "self_contact")
+        raise StudyError("self_contact: needs the package ipctk: pip install ipctk")
     inputs = read_inputs(study.body, garment, study.motions, study.motion_files)
     motions = split_motions(study, inputs.motions)
     of_file = [GarmentScenes(garment.name, f"a garment of {garment.path.name}")] if garment else []
@@ -131,7 +131,7 @@ def choose_metrics(study: Study) -> tuple[str, ...]:
     """Return the modules of metrics that are not the project's. Raises ValueError."""
     names, metrics = user_files.resolve(user_files.METRICS, study.metrics)
     for name in set(names) - {metric.name for metric in metrics}:
-        study.refuse(f"{name}: is no file; those of the project are measured without it", "metrics")
+        raise StudyError(f"metrics: {name}: is no file; those of the project are measured without it")
     homes = tuple(dict.fromkeys(metric.declared_in for metric in metrics))
     declared(homes)  # each name stands once
     return homes
@@ -148,12 +148,13 @@ def check_machines(study: Study, folder: Path, scheduler: str) -> None:
         find_device(study.device)
     trained = study.trained
     if trained and not trained.is_dir():
-        study.refuse(f"{trained}: no such folder; without DIR the package's are taken", "trained")
+        raise StudyError(f"trained: {trained}: no such folder; without DIR the package's are taken")
     if trained and trained.resolve() == folder.resolve():  # where networks of another training are removed
-        study.refuse(f"{trained}: the folder of this run itself: give another by --out", "trained")
+        raise StudyError(f"trained: {trained}: the folder of this run itself: give another by --out")
     for field, given in (("rollouts", study.rollouts), ("trained", trained), ("device", study.device)):
         if scheduler and given and given != "cpu":
-            study.refuse("a cluster has the cpu, and no file of this machine; leave out --scheduler", field)
+            what = f"{field}: a cluster has the cpu, and no file of this machine"
+            raise StudyError(f"{what}; leave out --scheduler")
 
 
 def choose_folder(folder: Path | None) -> Path:

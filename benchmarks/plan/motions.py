@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass
 
-from benchmarks.plan.study import Study, nearest
+from benchmarks.plan.study import Study, StudyError, nearest
 from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, of_garment
 from snug.motion.library import DYNAMIC_TEST, DYNAMIC_VALIDATION, LIBRARY, TEST, TRAIN, VALIDATION, clip_of
 
@@ -85,9 +85,9 @@ def split_motions(study: Study, files: Collection[str] = ()) -> Motions:
     for role, chosen in (("test", study.test_motions), ("validation", study.validation_motions)):
         for name in chosen:
             if name not in names:
-                study.refuse(f"unknown motion '{name}'; {nearest(name, names)}", f"{role}_motions")
+                raise StudyError(f"{role}_motions: unknown motion '{name}'; {nearest(name, names)}")
             if role == "validation" and clip_of(name) in tested:
-                study.refuse(f"'{name}' is a test motion; choose others", f"{role}_motions")
+                raise StudyError(f"{role}_motions: '{name}' is a test motion; choose others")
         roles[role] = tuple(name for name in names if name in chosen)
     test, validation = roles["test"], roles["validation"]
     if library:
@@ -102,5 +102,5 @@ def split_motions(study: Study, files: Collection[str] = ()) -> Motions:
     few = None if getattr(study, f"{split}_motions") else sizes.test_motions
     motions = Motions(train[: sizes.train_motions], test, validation, tuple(files), split=split, few=few)
     if not motions.measured:
-        study.refuse(f"no motion has this role; name some by {split}_motions", "split")
+        raise StudyError(f"split: no motion has this role; name some by {split}_motions")
     return motions

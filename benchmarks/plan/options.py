@@ -14,7 +14,7 @@ from benchmarks.declarations import attributes_of
 from benchmarks.external.roll_out_files import parse_roll_out
 from benchmarks.plan.choose_cells import matching, scenes_of_parts
 from benchmarks.plan.make_plan import read_files
-from benchmarks.plan.study import Layer, Study, StudyError, option, parse_setting, read_study, study_names
+from benchmarks.plan.study import Study, StudyError, Table, option, parse_setting, read_study, study_names
 from benchmarks.presets import PRESETS
 from reference_sim.command_line import Parser
 from snug.file_options import split_words
@@ -100,19 +100,16 @@ def add_study_options(parser: argparse.ArgumentParser, short: Sequence[str] = OF
         more: dict[str, Any] = {} if field in SINGLE else {"action": "append", "default": []}
         more |= {"nargs": "?", "const": True} if field == "trained" else {}
         more |= {"metavar": SHORT[field], "help": f"field {field}: {texts[field]}"}
-        parser.add_argument(_label(field), dest=field, **more)
-
-
-def _label(field: str) -> str:
-    return "--rollout" if field == "rollouts" else f"--{field.replace('_', '-')}"
+        name = "rollout" if field == "rollouts" else field.replace("_", "-")
+        parser.add_argument(f"--{name}", dest=field, **more)
 
 
 def study_of(options: argparse.Namespace, name: str = "default") -> Study:
     """Return the study of that name with the options of `add_study_options`. Raises ValueError."""
-    return read_study(name, [*_layers(options), *map(parse_setting, options.settings)])
+    return read_study(name, [*_tables(options), *map(parse_setting, options.settings)])
 
 
-def _layers(options: argparse.Namespace) -> Iterator[Layer]:
+def _tables(options: argparse.Namespace) -> Iterator[Table]:
     """Yield the fields that short forms give; words behind the path of motions are field motion_files."""
     for field in SHORT:
         value: Any = getattr(options, field, None)
@@ -125,14 +122,14 @@ def _layers(options: argparse.Namespace) -> Iterator[Layer]:
             paths = list(map(split_words, value))
             value = [path for path, _ in paths]
             if words := {name: word for _, given in paths for name, word in given.items()}:
-                yield option(_label(field), "motion_files", words)
+                yield option("motion_files", words)
         elif field == "rollouts":
             value = dict(map(parse_roll_out, value))
         elif field not in SINGLE:
             value = list(split(value))
         if field == "seeds":
             value = [int(word) if word.removeprefix("-").isdecimal() else word for word in value]
-        yield option(_label(field), field, value)
+        yield option(field, value)
 
 
 def split(values: Sequence[str]) -> tuple[str, ...]:

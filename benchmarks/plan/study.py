@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import difflib
 import tomllib
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from types import UnionType
@@ -119,28 +119,18 @@ class Study:
     device: Literal["cpu", "cuda"] = "cpu"
     show: Show | None = None
     written: Mapping[str, Any] = field(default_factory=dict, repr=False, compare=False)
-    origin: Callable[[tuple[str, ...]], str] = field(default=".".join, repr=False, compare=False)
 
-    def place(self, *field: str) -> str:
-        """Return where a field was said: a file and the field, or an option."""
-        return self.origin(field)
-
-    def refuse(self, message: str, *field: str) -> NoReturn:
-        """Raise StudyError with the place of the field."""
-        raise StudyError(f"{self.place(*field)}: {message}")
-
-    def check(self) -> None:
-        """Raise StudyError for numbers and names that no type refuses."""
+    def __post_init__(self) -> None:
         if not self.seeds or min(self.seeds) < 0 or max(self.seeds) >= 1 << 63:
             given = ",".join(map(str, self.seeds))[:40]
             wanted = "at least one whole number, none below 0 or beyond 63 bits"
-            self.refuse(f"'{given}': give {wanted}", "seeds")
+            raise StudyError(f"seeds: '{given}': give {wanted}")
         if self.sizes.frames < FEWEST_FRAMES:
-            self.refuse(f"{self.sizes.frames}: give {FEWEST_FRAMES} or more", "sizes", "frames")
+            raise StudyError(f"sizes.frames: {self.sizes.frames}: give {FEWEST_FRAMES} or more")
         for name in self.parts:
             if name not in PARTS and not self.parts[name].question:
-                known = f"no part is called so; choose from {', '.join(PARTS)}, or give it a question"
-                self.refuse(known, "parts", name)
+                known = f"choose from {', '.join(PARTS)}, or give it a question"
+                raise StudyError(f"parts.{name}: no part is called so; {known}")
 
 
 def nearest(word: str, names: Sequence[str], otherwise: str = "see --list") -> str:
@@ -152,73 +142,49 @@ def nearest(word: str, names: Sequence[str], otherwise: str = "see --list") -> s
 FILE = "study.toml"  # of a study that is a folder
 PACKAGED = Path(__file__).parents[1] / "studies"
 FOLDERS = (Path("studies"), Path(__file__).parents[2] / "studies")  # of studies that bring code
-HIDDEN = {  # attributes that no file gives
-    Study: ("written", "origin"), Preset: ("name", "description"), RollOutOption: ("role",),
-}  # fmt: skip
+HIDDEN = {Study: ("written",), Preset: ("name", "description"), RollOutOption: ("role",)}  # no file has them
 WORDS_FOR_TABLES = {"garment": "path", "sizes": "base"}  # table -> the field that a word in its place means
+PATHS = ("body", "trained", "motions", "path", "material")  # fields that hold paths
 KINDS = {str: "text", int: "a whole number", float: "a number", bool: "true or false"}
-Field = tuple[str, ...]
+Table = Mapping[str, Any]
 Record = TypeVar("Record")
 
 
-@dataclass(frozen=True)
-class Layer:
-    """Fields of one place: a file, or an option. The first that has a field decides.
-
-    folder: of the file, to which its paths are relative; None of an option.
-    """
-
-    label: str
-    table: dict[str, Any]
-    folder: Path | None = None
-
-    def has(self, field: Field) -> bool:
-        """Return whether the field stands here."""
-        table: Any = self.table
-        for name in field:
-            if not isinstance(table, Mapping) or name not in table:
-                return False
-            table = table[name]
-        return True
-
-
-def read_study(word: str = "default", options: Sequence[Layer] = ()) -> Study:
+def read_study(word: str = "default", options: Sequence[Table] = ()) -> Study:
     """Return the study of that name or path, with fields from options in place of its own.
 
     Args:
         word: name of a study of the package, or path of a file or folder; behind a colon the names of parts,
             as in full:garments,speed, for these alone.
-        options: later ones hold before earlier ones.
+        options: see `option`; later ones hold before earlier ones.
 
     Raises:
-        StudyError: no such study, or a field that cannot be meant: its place, and what is near it.
+        StudyError: no such study, or a field that cannot be meant, with what is near it.
 
-    >>> read_study("full:speed", [option("--seeds", "seeds", [1, 2])]).seeds
+    >>> read_study("full:speed", [option("seeds", [1, 2])]).seeds
     (1, 2)
     """
     name, _, chosen = word.partition(":")
-    layers = [*reversed(options), *_layers(find_study(name))]
-    merged: dict[str, Any] = {}
-    for layer in reversed(layers):
-        merged = _merged(merged, layer.table)
-    merged.pop("like", None)
+    table = _fields_of(find_study(name))
+    for given in options:
+        table = _merged(table, _with_tables(given))
     if chosen:
-        parts, names = merged.get("parts", {}), [part for part in chosen.split(",") if part]
+        parts, names = table.get("parts", {}), [part for part in chosen.split(",") if part]
         for part in names:
             if part not in parts:
                 raise StudyError(f"study {name}: no part '{part}'; it has {', '.join(parts)}")
-        merged["parts"] = {part: parts[part] for part in parts if part in names}
-    reader = _Reader(layers)
-    study: Study = reader.dataclass_of(Study, merged, ())
-    study = replace(study, written={"name": word, **merged}, origin=reader.place)
-    study.check()
-    return study
+        table = {**table, "parts": {part: parts[part] for part in parts if part in names}}
+    study: Study = _dataclass_of(Study, table)
+    return replace(study, written={"name": word, **table})
 
 
 def read_fields(kind: type[Record], path: Path) -> Record:
     """Return an object of a dataclass from a TOML file. Raises StudyError with file and field."""
-    layer = replace(next(_layers(path)), folder=Path())
-    record: Record = _Reader([layer]).dataclass_of(kind, layer.table, ())
+    table = _read_table(path)
+    try:
+        record: Record = _dataclass_of(kind, table)
+    except StudyError as error:
+        raise StudyError(f"{path}: {error}") from None
     return record
 
 
@@ -241,24 +207,28 @@ def study_names() -> list[str]:
     return [*(path.stem for path in sorted(PACKAGED.glob("*.toml"))), *with_code]
 
 
-def option(label: str, field: str, value: Any) -> Layer:
-    """Return the layer of an option that gives one field, dotted where it is one of a table."""
-    table = value
+def option(field: str, value: Any) -> Table:
+    """Return the table of one field, dotted where it is one of a table.
+
+    >>> option("sizes.frames", 60)
+    {'sizes': {'frames': 60}}
+    """
     for name in reversed(field.split(".")):
-        table = {name: table}
-    return Layer(label, _with_tables(table))
+        value = {name: value}
+    table: Table = value
+    return table
 
 
-def parse_setting(text: str) -> Layer:
-    """Return the layer of --set field=value. Raises StudyError.
+def parse_setting(text: str) -> Table:
+    """Return the table of --set field=value. Raises StudyError.
 
-    >>> parse_setting("sizes.frames=60").table, parse_setting("seeds=0,1").table
+    >>> parse_setting("sizes.frames=60"), parse_setting("seeds=0,1")
     ({'sizes': {'frames': 60}}, {'seeds': [0, 1]})
     """
     field, equals, value = text.partition("=")
     if not (field.strip() and equals and value.strip()):
         raise StudyError(f"--set {text}: give field=value, as in seeds=0,1,2 or sizes.frames=60")
-    return option(f"--set {text}", field, _value(value.strip()))
+    return option(field.strip(), _value(value.strip()))
 
 
 def _value(text: str) -> Any:
@@ -269,34 +239,48 @@ def _value(text: str) -> Any:
         return [_value(word.strip()) for word in text.split(",") if word.strip()] if "," in text else text
 
 
-def _layers(path: Path) -> Iterator[Layer]:
-    """Yield the fields of a file, then those of the study that it is like, and so on."""
-    seen: list[Path] = []
-    while path not in seen:
-        seen.append(path)
-        try:
-            table = tomllib.loads(path.read_text(encoding="utf-8"))
-        except (OSError, ValueError) as error:
-            raise StudyError(f"{path}: not readable as TOML ({' '.join(str(error).split())})") from None
-        yield Layer(str(path), _with_tables(table), Path() if path.parent == PACKAGED else path.parent)
-        if "like" not in table:
-            return
-        like = str(table["like"])
-        beside = path.parent / like
-        path = beside if beside.is_file() else find_study(str(beside) if beside.is_dir() else like)
-    raise StudyError(f"{path}: like = '{like}': is like itself")
+def _read_table(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise StudyError(f"{path}: not readable as TOML ({' '.join(str(error).split())})") from None
 
 
-def _with_tables(table: dict[str, Any]) -> dict[str, Any]:
+def _fields_of(path: Path, seen: tuple[Path, ...] = ()) -> Table:
+    """Return the fields of a file and, below them, of the study that it is like, and so on."""
+    if path in seen:
+        raise StudyError(f"{path}: is like itself")
+    table = _with_tables(_read_table(path))
+    if path.parent != PACKAGED:
+        table = _beside(path.parent, "", table)
+    if "like" not in table:
+        return table
+    like = str(table.pop("like"))
+    beside = path.parent / like
+    base = beside if beside.is_file() else find_study(str(beside) if beside.is_dir() else like)
+    return _merged(_fields_of(base, (*seen, path)), table)
+
+
+def _beside(folder: Path, name: str, value: Any) -> Any:
+    """Return the value of a field with its paths relative to where `folder` is."""
+    if isinstance(value, Mapping):
+        return {name: _beside(folder, name, held) for name, held in value.items()}
+    if isinstance(value, list):
+        return [_beside(folder, name, held) for held in value]
+    is_path = isinstance(value, str) and (name in PATHS or value.endswith(".py")) and value != LIBRARY
+    return str(folder / value) if is_path else value
+
+
+def _with_tables(table: Table) -> dict[str, Any]:
     """Return the fields with a table for each word that may stand in place of one."""
     meant = {name: WORDS_FOR_TABLES[name] for name in WORDS_FOR_TABLES if isinstance(table.get(name), str)}
-    table = table | {name: {field: table[name]} for name, field in meant.items()}
+    table = {**table, **{name: {field: table[name]} for name, field in meant.items()}}
     if isinstance(files := table.get("rollouts"), Mapping):
         table["rollouts"] = {n: {"path": v} if isinstance(v, str) else v for n, v in files.items()}
     return table
 
 
-def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any]:
+def _merged(below: Table, above: Table) -> dict[str, Any]:
     """Return the fields of both; tables are joined, all else is that of `above`."""
     merged = {**below, **above}
     for name, value in above.items():
@@ -305,80 +289,58 @@ def _merged(below: Mapping[str, Any], above: Mapping[str, Any]) -> dict[str, Any
     return merged
 
 
-class _Reader:
-    """Values of fields by the types of dataclasses."""
+def _refuse(field: Sequence[str], message: object) -> NoReturn:
+    raise StudyError(f"{'.'.join(field)}{': ' * bool(field)}{message}")
 
-    def __init__(self, layers: Sequence[Layer]) -> None:
-        self.layers = layers
 
-    def layer(self, field: Field) -> Layer:
-        """Return the layer that decides a field; of one that is absent, that of the file."""
-        return next((layer for layer in self.layers if layer.has(field)), self.layers[-1])
+def _dataclass_of(kind: Any, table: Any, field: tuple[str, ...] = ()) -> Any:
+    """Return an object of a dataclass from the table of its fields; what it refuses gets its place."""
+    table = _table(table, field)
+    if kind is RollOutOption:
+        table["name"] = field[-1]
+    base = table.pop("base", "quick") if kind is Preset else ""
+    declared = [f.name for f in fields(kind) if f.name not in HIDDEN.get(kind, ())]
+    for name in table:
+        if name not in declared:
+            near = nearest(name, declared, otherwise=f"there are {', '.join(declared)}")
+            _refuse((*field, name), f"no field is called '{name}'; {near}")
+    hints = get_type_hints(kind)
+    try:
+        table = _merged(asdict(find_preset(base)), table) if base else table
+        return kind(**{name: _value_of(hints[name], table[name], (*field, name)) for name in table})
+    except StudyError:
+        raise
+    except (TypeError, ValueError) as error:
+        _refuse(field, error)
 
-    def place(self, field: Field) -> str:
-        """Return where a field was said."""
-        layer = self.layer(field)
-        words = [] if layer.folder is None else [".".join(field)]
-        return ": ".join(filter(None, [layer.label, *words]))
 
-    def path(self, field: Field, name: str) -> Path:
-        """Return a path; those of a file are relative to its folder."""
-        return (self.layer(field).folder or Path()) / name
+def _table(value: Any, field: tuple[str, ...]) -> dict[str, Any]:
+    if not isinstance(value, Mapping):
+        _refuse(field, f"{value!r}: give a table")
+    return dict(value)
 
-    def refuse(self, field: Field, message: str) -> NoReturn:
-        """Raise StudyError with the place."""
-        raise StudyError(f"{self.place(field)}: {message}")
 
-    def dataclass_of(self, kind: Any, table: Any, field: Field) -> Any:
-        """Return an object of a dataclass from the table of its fields; what it refuses gets its place."""
-        table = self.table(table, field)
-        if kind is RollOutOption:
-            table |= {"name": field[-1], "path": str(self.path(field, str(table.get("path", ""))))}
-        base = table.pop("base", "quick") if kind is Preset else ""
-        declared = [f.name for f in fields(kind) if f.name not in HIDDEN.get(kind, ())]
-        for name in table:
-            if name not in declared:
-                near = nearest(name, declared, otherwise=f"there are {', '.join(declared)}")
-                self.refuse((*field, name), f"no field is called '{name}'; {near}")
-        hints = get_type_hints(kind)
-        try:
-            table = _merged(asdict(find_preset(base)), table) if base else table
-            return kind(**{name: self.value(hints[name], table[name], (*field, name)) for name in table})
-        except StudyError:
-            raise
-        except (TypeError, ValueError) as error:
-            self.refuse(field, str(error))
-
-    def table(self, value: Any, field: Field) -> dict[str, Any]:
-        """Return a copy of a table."""
-        if not isinstance(value, Mapping):
-            self.refuse(field, f"{value!r}: give a table")
-        return dict(value)
-
-    def value(self, hint: Any, value: Any, field: Field) -> Any:
-        """Return the value of a field as its type asks for it."""
-        origin, types = get_origin(hint), get_args(hint)
-        if origin is UnionType:  # of a type and None
-            return None if value is None else self.value(types[0], value, field)
-        if field == ("trained",) and isinstance(value, bool):
-            return FOLDER if value else None
-        if origin is Literal:
-            if value not in types:
-                self.refuse(field, f"{value!r}: choose from {', '.join(types)}")
-            return value
-        if origin is tuple:
-            values = value if isinstance(value, list | tuple) else [value]
-            return tuple(self.value(types[0], v, field) for v in values)
-        if origin in (dict, Mapping):
-            table = self.table(value, field)
-            return {name: self.value(types[1], v, (*field, name)) for name, v in table.items()}
-        if is_dataclass(hint):
-            return self.dataclass_of(hint, value, field)
-        if hint is float and type(value) is int:
-            return float(value)
-        if type(value) is not (str if hint is Path else hint) or (hint is Path and not value):
-            self.refuse(field, f"{value!r}: give {KINDS.get(hint, 'a path')}")
-        if hint is Path:
-            return self.path(field, value)
-        file = hint is str and (value.endswith(".py") or (field == ("motions",) and value != LIBRARY))
-        return str(self.path(field, value)) if file else value
+def _value_of(hint: Any, value: Any, field: tuple[str, ...]) -> Any:
+    """Return the value of a field as its type asks for it."""
+    origin, types = get_origin(hint), get_args(hint)
+    if origin is UnionType:  # of a type and None
+        return None if value is None else _value_of(types[0], value, field)
+    if field == ("trained",) and isinstance(value, bool):
+        return FOLDER if value else None
+    if origin is Literal:
+        if value not in types:
+            _refuse(field, f"{value!r}: choose from {', '.join(types)}")
+        return value
+    if origin is tuple:
+        values = value if isinstance(value, list | tuple) else [value]
+        return tuple(_value_of(types[0], held, field) for held in values)
+    if origin in (dict, Mapping):
+        held = _table(value, field)
+        return {name: _value_of(types[1], held[name], (*field, name)) for name in held}
+    if is_dataclass(hint):
+        return _dataclass_of(hint, value, field)
+    if hint is float and type(value) is int:
+        return float(value)
+    if type(value) is not (str if hint is Path else hint):
+        _refuse(field, f"{value!r}: give {KINDS.get(hint, 'a path')}")
+    return Path(value) if hint is Path else value

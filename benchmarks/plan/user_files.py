@@ -104,7 +104,7 @@ def entries_of(kind: Kind, home: str) -> list[Any]:
         cases = cases_of(module.__name__)
         _demand(cases, f"{home}: declares no known answer, a function with @known_answer")
         return [replace(case, module=home) for case in cases]
-    declared = getattr(module, kind.tuple_name, None)
+    declared: Any = getattr(module, kind.tuple_name, None)
     meant = declared and isinstance(declared, tuple | list)
     if not (meant and all(isinstance(entry, kind.entry) for entry in declared)):
         raise DeclarationError(f"{home}: declares no {kind.tuple_name}, a tuple of {kind.entry.__name__}")

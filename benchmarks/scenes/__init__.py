@@ -110,9 +110,7 @@ def of_garment(garment: str, worn: tuple[GarmentScenes, ...] = GARMENT_SCENES) -
 
 
 def all_scenes(
-    motions: Iterable[str],
-    dynamic_motions: Iterable[str],
-    worn: tuple[GarmentScenes, ...] = GARMENT_SCENES,
+    motions: Iterable[str], dynamic_motions: Iterable[str], worn: tuple[GarmentScenes, ...] = GARMENT_SCENES
 ) -> dict[str, Scene]:
     """Return every scene by name: those without a body, then dressed bodies in each motion and in its clip.
 
@@ -121,13 +119,12 @@ def all_scenes(
     """
     motions, dynamic = list(motions), list(dynamic_motions)
     first = worn[0].garment
-    long = [there_and_back(motion, first) for motion in motions[:1]]
-    shaped = [scene for motion in motions[:1] for scene in shapes(motion, first)]
-    chosen = {False: list(dict.fromkeys((*motions, *dynamic))), True: dynamic}
+    varied = [s for motion in motions[:1] for s in (there_and_back(motion, first), *shapes(motion, first))]
+    every = list(dict.fromkeys((*motions, *dynamic)))
     dressed = [
         scenes.scene(motion, part)
         for scenes in worn
-        for motion in chosen[scenes.dynamic]
+        for motion in (dynamic if scenes.dynamic else every)
         for part in ("whole", "clip")
     ]
-    return by_name("scene", (*SCENES, *dressed, *long, *shaped, *further_scenes(first)))
+    return by_name("scene", (*SCENES, *dressed, *varied, *further_scenes(first)))

@@ -23,10 +23,9 @@ from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.obstacle import Obstacle
 from reference_sim.time_loop import simulate
 from reference_sim.trajectory import Trajectory
-from snug.garments.garment import Garment
 from snug.garments.templates import find_template
 from snug.motion.library import make_motion
-from snug.motion.motion import Motion, transition
+from snug.motion.motion import transition
 
 if TYPE_CHECKING:
     from benchmarks.presets import Dependence
@@ -50,16 +49,16 @@ def build_dressed_body(
     says what is raised.
     """
     body, garment = assets.body, assets.garments[scene.garment]
-    shape = shape_of(body, betas, scene.name)
     motion = assets.motion(scene.motion, scene.part)
     before = assets.before(scene.motion, scene.part)
+    dressed = Dressed(body, garment, motion, shape_of(body, betas, scene.name), before)
 
     def settle() -> np.ndarray:
         if before is None:
-            return settled(cloth, terms, assets, garment, motion, settle_frames, shape)
-        start = settled(cloth, terms, assets, garment, before, settle_frames, shape)
+            return settled(cloth, terms, dressed, settle_frames)
+        start = settled(cloth, terms, replace(dressed, motion=before), settle_frames)
         way, aim = before.followed_by(motion.cut(0, 1)), "reach the first frame of the clip"
-        x = _simulated(cloth, terms, body, garment, way, start, shape, aim)
+        x = _simulated(cloth, terms, replace(dressed, motion=way), start, aim)
         return np.stack([x[-1], (x[-1] - x[-2]) * way.fps])
 
     cloth = garment.cloth()
@@ -70,10 +69,10 @@ def build_dressed_body(
 
         minimised = with_self_contact(energies)
     terms = minimised or energies
+    warm_up = max(2, min(warm_up_frames, int(SHORT * motion.frames)))
     return worn(
-        scene, assets, Dressed(body, garment, motion, shape, before=before), cloth=cloth, energies=energies,
-        settle=settle, minimised=minimised,
-        warm_up=max(2, min(warm_up_frames, int(SHORT * motion.frames))),
+        scene, assets, dressed, cloth=cloth, energies=energies, settle=settle, minimised=minimised,
+        warm_up=warm_up,
     )  # fmt: skip
 
 
@@ -111,16 +110,13 @@ def declared_energies(cloth: Cloth) -> tuple[Energy, ...]:
     return (StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), ContactPenalty(cloth))
 
 
-def settled(
-    cloth: Cloth, energies: tuple[Energy, ...], assets: Assets, garment: Garment, motion: Motion, frames: int,
-    betas: np.ndarray | None = None,
-) -> np.ndarray:  # fmt: skip
+def settled(cloth: Cloth, energies: tuple[Energy, ...], dressed: Dressed, frames: int) -> np.ndarray:
     """Simulate the cloth to rest on the body in the motion's first pose: positions (V,3) [m].
 
     Raises RuntimeError when the simulation of the approach did not stay finite, and ValueError for a garment
     that crosses itself before it where that is not allowed.
     """
-    body = assets.body
+    body, garment, motion, betas = dressed.body, dressed.garment, dressed.motion, dressed.betas
     first = motion.poses[0]
     t_pose = np.zeros_like(first)
     t_pose[0] = first[0]
@@ -134,15 +130,15 @@ def settled(
         from benchmarks.scenes.self_contact import demand_uncrossed  # loads the barrier
 
         demand_uncrossed(start, energies, f"garment {garment.name}")
-    way = replace(motion, poses=poses, translations=translations)
-    return _simulated(cloth, energies, body, garment, way, start, betas, "come to rest in the first pose")[-1]
+    way = replace(dressed, motion=replace(motion, poses=poses, translations=translations))
+    return _simulated(cloth, energies, way, start, "come to rest in the first pose")[-1]
 
 
 def _simulated(
-    cloth: Cloth, energies: tuple[Energy, ...], body: Body, garment: Garment, motion: Motion,
-    start: np.ndarray, betas: np.ndarray | None, aim: str,
-) -> np.ndarray:  # fmt: skip
+    cloth: Cloth, energies: tuple[Energy, ...], dressed: Dressed, start: np.ndarray, aim: str
+) -> np.ndarray:
     """Simulate every frame of the motion, (T,V,3) [m]. Raises RuntimeError naming the missed `aim`."""
+    body, garment, motion, betas = dressed.body, dressed.garment, dressed.motion, dressed.betas
     posed = body.vertices(motion.poses, motion.translations, betas)
     handles = garment.pin_positions(body, motion.poses, motion.translations, betas)
     trajectory: Trajectory = simulate(

@@ -57,7 +57,7 @@ def build_hard_motion(
 
     def settle() -> np.ndarray:
         if shape is None:
-            return settled(cloth, energies, assets, garment, motion, settle_frames)
+            return settled(cloth, energies, dressed, settle_frames)
         root = body.transforms(motion.poses[:1], motion.translations[:1], shape)[0, 0]
         return garment.rest_for(body, shape) @ root[:, :3].T + root[:, 3]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from pathlib import Path
 
 import pytest
 
@@ -15,11 +14,6 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.validation.registry import KNOWN_ANSWERS, STRESS_TESTS
 from reference_sim.files.array_file import read_arrays
 from tests.benchmarks.plan.planned import planned
-
-ROOT = Path(__file__).resolve().parents[2]
-
-
-# --- quick answers ---------------------------------------------------------------------------------------
 
 
 def test_the_help_names_every_exit_status(capsys):
@@ -43,9 +37,6 @@ def test_the_list_has_the_scenes_that_the_study_measures(capsys):
     names = measured.splitlines()[1].split("speed", 1)[1].strip().split(", ")
     assert names == [scene.name for scene in planned("smoke:speed").scenes]
     assert len(measured.splitlines()) == 2
-
-
-# --- a run -----------------------------------------------------------------------------------------------
 
 
 @pytest.fixture

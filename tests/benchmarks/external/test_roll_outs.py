@@ -213,7 +213,7 @@ def test_an_option_says_everything_of_a_roll_out():
 def test_a_wrong_option_is_one_line(text, hint):
     with pytest.raises(ValueError, match=hint) as refused:
         name, table = parse_roll_out(text)
-        read_study(options=[option("--rollout", "rollouts", {name: table})])
+        read_study(options=[option("rollouts", {name: table})])
     assert "\n" not in str(refused.value)
 
 

@@ -15,7 +15,7 @@ def scene():
     dressed, motion = tube_dress(), swaying(8)
     body = dressed.body
     skin = body.vertices(motion.poses, motion.translations)
-    clean = CollisionPostProcessing(dressed.garment.rest_positions, body.shaped(), body.faces, skin)
+    clean = CollisionPostProcessing(dressed, skin)
     obstacle = Obstacle(skin, body.faces, rest_positions=body.shaped())
     return clean, obstacle, dressed.skinned(motion, smoothing=20)
 

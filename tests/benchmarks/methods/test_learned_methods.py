@@ -1,4 +1,4 @@
-"""Further baselines and ablations run when they are named or at a preset that holds them, never unasked."""
+"""Every trained method has a training; one that was killed goes on where it was."""
 
 from __future__ import annotations
 

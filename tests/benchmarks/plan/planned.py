@@ -17,4 +17,4 @@ def planned(*words: str) -> Plan:
 
 
 def study_with(name: str = "default", **fields: Any) -> Study:
-    return read_study(name, [option(f"--{field}", field, value) for field, value in fields.items()])
+    return read_study(name, [option(field, value) for field, value in fields.items()])

@@ -10,7 +10,7 @@ from benchmarks.metrics import measured_in
 from benchmarks.plan.choose_cells import expanded, matching
 from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.motions import Motions, split_motions
-from benchmarks.plan.study import Study, StudyError, read_study
+from benchmarks.plan.study import StudyError, read_study
 from benchmarks.presets import find_preset
 from benchmarks.scenes import GARMENT_SCENES
 from snug.motion.library import DYNAMIC_TEST
@@ -71,30 +71,34 @@ def test_places_of_a_pattern_are_filled_by_motions_of_the_split():
     assert expanded(["skirt/{swinging 1}", "skirt/{swinging 9}"], motions) == [f"skirt/{DYNAMIC_TEST[0]}"]
 
 
-def test_a_pattern_of_another_garment_means_its_motions_of_the_split():
-    for split in ("test", "validation"):
-        plan = planned("default:garments", "--set", f"split={split}", "--scenes", "trousers/*")
-        scenes = {scene.name for scene in plan.scenes}
-        assert scenes == {f"trousers/{motion}" for motion in plan.motions.measured} and len(scenes) >= 4
-    plan = planned("default:garments", "--scenes", "skirt/*")
-    assert {s.name for s in plan.scenes} == {f"skirt/{motion}" for motion in plan.motions.dynamic_measured}
-    plan = planned("default:speed", "--scenes", "shorts/*@clip")
-    assert {s.name for s in plan.scenes} == {f"shorts/{motion}@clip" for motion in plan.motions.measured}
+@pytest.mark.parametrize(
+    ("part", "pattern", "split"),
+    [
+        ("garments", "trousers/*", "test"),
+        ("garments", "skirt/*", "validation"),
+        ("speed", "shorts/*@clip", "test"),
+    ],
+)
+def test_a_pattern_of_another_garment_means_its_motions_of_the_split(part, pattern, split):
+    plan = planned(f"default:{part}", "--set", f"split={split}", "--scenes", pattern)
+    measured = plan.motions.measured_of(pattern.partition("/")[0])
+    assert {scene.name for scene in plan.scenes} == {pattern.replace("*", motion) for motion in measured}
+    assert len(measured) > 1
+
+
+def divided(files=(), **fields):
+    return split_motions(study_with(**fields), files)
 
 
 def test_sizes_quick_have_eight_motions_paper_all_and_either_those_that_are_named():
-    def motions(*words):
-        cells = planned(*words, "--methods", "simulation").cells
-        return {cell.scene.motion for cell in cells if cell.scene.part == "whole"}
-
-    everything = set(split_motions(Study()).measured)
-    assert len(everything) == 8 and motions("default:garments") == motions("full:garments") == everything
-    assert everything < motions("paper:garments") and len(split_motions(study_with("paper")).measured) == 22
-    named = "kick,punch,walk,bow"
-    assert motions("full:garments", "--test-motions", named) == set(named.split(","))
-    validation = ("full:garments", "--set", "split=validation")
-    assert motions(*validation, "--set", f"validation_motions={named}") == set(named.split(","))
-    assert len(motions(*validation, "--test-motions", "walk")) == 8
+    everything, named = divided().measured, ["kick", "punch", "walk", "bow"]
+    assert len(everything) == 8
+    assert {*everything} < {*divided(sizes="paper").measured} and len(divided(sizes="paper").measured) == 22
+    cells = planned("full:garments", "--methods", "simulation").cells
+    assert {cell.scene.motion for cell in cells if cell.scene.part == "whole"} == set(everything)
+    assert {*divided(test_motions=named).measured} == {*named}
+    assert {*divided(split="validation", validation_motions=named).measured} == {*named}
+    assert len(divided(split="validation", test_motions="walk").measured) == 8
 
 
 def test_what_no_part_lists_is_met_by_its_whole_name():
@@ -102,10 +106,6 @@ def test_what_no_part_lists_is_met_by_its_whole_name():
     met = {(cell.scene.name, cell.suites) for cell in planned("--scenes", f"{clip},{whole}").cells}
     assert met == {(clip, ("speed",)), (whole, ("garments",))}
     assert not {clip, whole} & {scene.name for scene in planned().scenes}
-
-
-def divided(files=(), **fields):
-    return split_motions(study_with(**fields), files)
 
 
 def test_motions_are_divided_as_help_says():
@@ -125,32 +125,25 @@ def test_motions_are_divided_as_help_says():
     assert (len(small.train), len(small.measured)) == (SMOKE.train_motions, SMOKE.test_motions)
 
     clips = "abc"
-    files = divided(clips)
-    assert (files.train, files.test, sorted(files.files)) == (("b", "c"), ("a",), ["a", "b", "c"])
-    named = divided(sizes="smoke", test_motions=["kick", "punch", "walk"])  # all, whatever the sizes
-    assert set(named.test) == {"kick", "punch", "walk"} and len(named.train) == SMOKE.train_motions
     chosen = divided(clips, test_motions=["c", "b"])
-    assert (chosen.train, chosen.test) == (("a",), ("b", "c"))
-    both = divided(clips, motions="library")
+    assert (chosen.train, chosen.test, sorted(chosen.files)) == (("a",), ("b", "c"), ["a", "b", "c"])
+    files, both, single = divided(clips), divided(clips, motions="library"), divided("a")
+    assert (files.train, files.test) == (("b", "c"), ("a",))
     assert both.train == ("a", "b", "c", *TRAIN) and both.measured == TEST[:8]
-    single = divided("a")
     assert (single.train, single.test) == (TRAIN, ("a",))
     roles = divided(clips, test_motions="b", validation_motions=["a", "c"])  # none is left to train on
     assert (roles.train, roles.validation, roles.test) == (TRAIN, ("a", "c"), ("b",))
-    assert [roles.role_of(name) for name in ("a", "b", "walk", "kick")] == [
-        "validation", "test", "", "",
-    ]  # fmt: skip
+    assert [*map(roles.role_of, ("a", "b", "walk", "kick"))] == ["validation", "test", "", ""]
     # A user's files of clips whose parts are measured do not train, nor does the library's.
     motions = divided(["01_01", "05_02", "05_12", "a"], motions="library")
     assert motions.train[:2] == ("05_12", "a") and not {"01_01", "05_02"} & set(motions.train)
     alone = divided(["01_01", "05_02", "05_12"], test_motions="05_12")
     assert (alone.train, alone.test) == (("01_01", "05_02"), ("05_12",))
     assert "05_12" not in divided(["05_12"]).train
-    whole = divided(test_motions=["01_01", "05_04"])
-    assert set(whole.test) == {"01_01", "05_04"} and "05_04" not in whole.train
+    assert "05_04" not in divided(test_motions=["01_01", "05_04"]).train
     for fields, message in (
         ({"test_motions": "a", "validation_motions": "a"}, "'a' is a test motion"),
-        ({"validation_motions": "d"}, "--validation_motions: unknown motion 'd'"),
+        ({"validation_motions": "d"}, "validation_motions: unknown motion 'd'"),
         ({"test_motions": "a", "split": "validation"}, "name some by validation_motions"),
     ):
         with pytest.raises(StudyError, match=message):
@@ -164,5 +157,3 @@ def test_a_recipe_is_never_chosen_by_the_test_motions():
     assert ablations.split == "validation" and not ablations.test_motions
     motions = split_motions(ablations)
     assert motions.measured == VALIDATION[:8] and not set(TEST) & {*motions.measured, *motions.train}
-    with pytest.raises(StudyError, match="'dance_turn' is a test motion"):
-        divided(validation_motions="dance_turn", split="validation")

@@ -23,28 +23,27 @@ from tests.snug.training.dressing import tube_dress
 WORDS = ("smoke:garments", "--methods", "skinning")
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def tube():
-    """150 vertices, made in milliseconds."""
     return tube_dress().garment
 
 
 def test_an_own_garment_takes_the_place_of_the_tshirt_in_every_scene(tmp_path, tube):
-    path, out = saved(tmp_path, tube), str(tmp_path / "run")
-    plan = planned("smoke", "--garment", str(path), "-o", out)
+    path = str(saved(tmp_path, tube))
+    plan = planned("smoke", "--garment", path)
     worn = {scene.garment for scene in plan.scenes if scene.dressed}
     assert worn == {"mine"} and {network.garment for network in plan.networks} == {"mine"}
     names = {scene.name for scene in plan.scenes}
     assert {"mine/01_01_a", "mine/there_and_back", "out_of_distribution/ordinary"} <= names
     with pytest.raises(StudyError, match="unknown scene 'dependence/mesh/500'"):  # it tailors one itself
-        planned("--garment", str(path), "--scenes", "dependence/mesh/500", "-o", out)
+        planned("--garment", path, "--scenes", "dependence/mesh/500")
 
 
 def test_what_a_garment_is_read_from_is_an_input_of_all_that_wears_it(tmp_path, tube):
-    path, out = saved(tmp_path, tube), str(tmp_path / "run")
+    path = saved(tmp_path, tube)
 
     def inputs(words=""):
-        plan = planned(*WORDS, "--garment", f"{path}{words}", "-o", out)
+        plan = planned(*WORDS, "--garment", f"{path}{words}", "-o", str(tmp_path / "run"))
         return Schedule(plan).cell(plan.cells[0]).inputs
 
     first = inputs()
@@ -70,32 +69,17 @@ def test_a_garment_of_ones_own_goes_through_a_run(tmp_path):
     assert (folder.models_of("mine") / "snug-seed0.safetensors").is_file()
 
 
-def subject(folder: Path, *clips: str) -> str:
-    """A subject of AMASS: its shape lies beside its clips."""
-    path = write_motions(folder, *clips)
-    np.savez(folder / "shape.npz", gender=np.array("male"), betas=np.zeros(16))
-    return path
-
-
 def test_a_file_of_a_body_shape_beside_clips_is_left_out(tmp_path, refused):
-    out = ("-o", str(tmp_path / "run"))
-    folder = subject(tmp_path / "01", "01_01", "a b")
-    plan = planned(*WORDS, "--motions", folder, *out)
-    assert set(plan.inputs.motions) == {"01_01", "a b"}
-    shapes = subject(tmp_path / "shapes")
-    (tmp_path / "01" / "b.npz").write_bytes(b"PK")
+    folder = Path(write_motions(tmp_path / "01", "01_01", "a b"))  # a subject of AMASS
+    np.savez(folder / "shape.npz", gender=np.array("male"), betas=np.zeros(16))
+    assert set(planned(*WORDS, "--motions", str(folder)).inputs.motions) == {"01_01", "a b"}
+    (folder / "b.npz").write_bytes(b"PK")
     # A shape that is named by itself was meant to be a motion.
-    for path, hint in ((f"{folder}/shape.npz", "no array 'poses'"), (shapes, "holds no motion file"),
-                       (folder, "b.npz")):  # fmt: skip
-        refused(hint, run.main, [*WORDS, "--motions", path, *out])
+    for path, hint in ((folder / "shape.npz", "no array 'poses'"), (folder, "b.npz")):
+        refused(hint, run.main, [*WORDS, "--motions", str(path), "-o", str(tmp_path / "run")])
 
 
 def test_own_clips_that_are_cut_are_named_and_more_frames_are_measured_where_they_are_set(tmp_path):
-    poses = np.zeros((200, 72))
-    np.savez(tmp_path / "long.npz", poses=poses, trans=np.zeros((200, 3)), mocap_framerate=30.0)
-
-    def plan_of(*words: str):
-        return planned("--motions", str(tmp_path), "--test-motions", "long", "--methods", "skinning", *words)
-
-    assert plan_of().cut_motions == {"long": "the first 150 of 200 frames"}
-    assert plan_of("--set", "sizes.frames=200").cut_motions == {}
+    words = ("--motions", write_motions(tmp_path / "a", "long", frames=200), "--methods", "skinning")
+    assert planned(*words).cut_motions == {"long": "the first 150 of 200 frames"}
+    assert planned(*words, "--set", "sizes.frames=200").cut_motions == {}

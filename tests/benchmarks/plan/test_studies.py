@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from fnmatch import fnmatch
 from pathlib import Path
 
@@ -37,11 +38,9 @@ others = { path = "o.pc2", units = "cm", ms = 2.5 }
 
 @pytest.fixture
 def mine(tmp_path) -> Path:
-    """A user's study: a folder beside whose study.toml lie the files that it names."""
-    folder = tmp_path / "mine"
-    folder.mkdir()
-    (folder / "study.toml").write_text(MINE)
-    return folder
+    """The folder of a user's study, beside whose study.toml lie the files that it names."""
+    (tmp_path / "study.toml").write_text(MINE)
+    return tmp_path
 
 
 def test_a_study_has_its_own_fields_those_that_it_is_like_and_paths_beside_its_file(mine):
@@ -52,11 +51,11 @@ def test_a_study_has_its_own_fields_those_that_it_is_like_and_paths_beside_its_f
     assert study.parts["speed"].methods == ("simulation", str(mine / "mine.py"))
     assert list(study.parts) == ["garments", "speed", "validation", "extremes", "shapes"]
     quick = find_preset("quick")
-    assert study.sizes.frames == 60 and study.sizes.steps == {**quick.steps, "snug": 7}
-    assert study.sizes.dependence.frames == 3 and study.sizes.dependence.meshes == quick.dependence.meshes
+    dependence = replace(quick.dependence, frames=3)
+    assert study.sizes == replace(quick, frames=60, steps={**quick.steps, "snug": 7}, dependence=dependence)
     assert study.garment.path == mine / "shirt.obj" and study.garment.shift == (0.0, 0.1, 0.0)
     assert study.rollouts["theirs"].path == str(mine / "out/{scene}.npz")
-    assert study.rollouts["others"].units == "cm" and study.rollouts["others"].ms == 2.5
+    assert (study.rollouts["others"].units, study.rollouts["others"].ms) == ("cm", 2.5)
     assert study.written["sizes"]["frames"] == 60 and "like" not in study.written
     (mine / "other.toml").write_text('like = "study.toml"\nbody = "other.npz"\n')
     assert read_study(str(mine / "other.toml")).body == mine / "other.npz"
@@ -75,14 +74,14 @@ def test_options_hold_before_the_file_and_their_paths_are_relative_to_where_one_
     [
         ("seeds=0,1", {"seeds": [0, 1]}),
         ("test_motions=a,b", {"test_motions": ["a", "b"]}),
-        ("sizes=smoke", {"sizes": {"base": "smoke"}}),
+        ("sizes=smoke", {"sizes": "smoke"}),
         ('parts.speed.scenes=["flag"]', {"parts": {"speed": {"scenes": ["flag"]}}}),
-        ("rollouts.mine=a.npz", {"rollouts": {"mine": {"path": "a.npz"}}}),
+        ("rollouts.mine=a.npz", {"rollouts": {"mine": "a.npz"}}),
         ("motions=clips/a b", {"motions": "clips/a b"}),
     ],
 )
 def test_a_setting_is_a_field_and_a_value_of_toml_or_a_word(text, table):
-    assert parse_setting(text).table == table
+    assert parse_setting(text) == table
 
 
 def test_trained_true_means_the_networks_of_the_package():

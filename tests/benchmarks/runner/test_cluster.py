@@ -152,7 +152,7 @@ def test_where_nobody_answers_and_without_dask_the_remedy_is_said(monkeypatch):
 @pytest.mark.parametrize(("field", "value"), [("device", "cuda"), ("rollouts", {"mine": {"path": "a.npz"}})])
 def test_what_a_cluster_cannot_do_is_refused(field, value, tmp_path, monkeypatch):
     monkeypatch.setattr("snug.training.device.find_device", lambda name: None)
-    with pytest.raises(StudyError, match=f"--{field}.*leave out --scheduler"):
+    with pytest.raises(StudyError, match=f"{field}: .*leave out --scheduler"):
         check_machines(study_with(**{field: value}), tmp_path, "tcp://127.0.0.1:1")
 
 

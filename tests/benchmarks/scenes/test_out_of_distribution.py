@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 
 import numpy as np
 import pytest
@@ -44,34 +44,26 @@ def assets():
 
 
 @pytest.fixture(scope="module")
-def walk():
-    return make_motion("walk")
-
-
-@pytest.fixture(scope="module")
-def models(assets, walk, tmp_path_factory):
+def models(assets, tmp_path_factory):
     """Return the folder of a saved network with a random last layer."""
     folder = tmp_path_factory.mktemp("models")
     dressed = DressedBody(assets.body, assets.garments["tshirt"])
-    untrained_model("snug", dressed, [walk], seed=0).save(model_path(folder, "snug", 0))
+    untrained_model("snug", dressed, [make_motion("walk")], seed=0).save(model_path(folder, "snug", 0))
     return folder
 
 
-def built(assets, name):
-    return find_scene(name).at(SMOKE).build(assets)
+def rolled_out(assets, models, name, method):
+    """The built scene, and the method that has rolled out in it."""
+    scene = find_scene(name).at(SMOKE).build(assets)
+    made = find_method(method).make(models=models, seed=0)
+    made.prepare(scene)
+    return scene, made, made.run().positions
 
 
-def motion_of(scene, walk):
-    options = {k: v for k, v in scene.options.items() if k not in ("change", "betas", "material")}
-    return hard_motions.CHANGES[scene.options["change"]](walk, **options)
-
-
-def plan_of(folder, cells):
-    return Plan(preset=SMOKE, suites=("extremes",), cells=cells, folder=folder)
-
-
-def test_what_is_hard_about_each(walk):
-    made = {scene.name.partition("/")[2]: motion_of(scene, walk) for scene in CASES}
+def test_what_is_hard_about_each(assets):
+    scenes = {scene.name.partition("/")[2]: scene.at(SMOKE).build(assets) for scene in CASES}
+    made = {name: scene.dressed.motion for name, scene in scenes.items()}
+    walk = make_motion("walk")
     assert np.array_equal(made["walk_x4"].poses, walk.poses[::4])
     plain, wrong = hard_motions.ordinary(walk), hard_motions.GLITCH
     jump = made["root_glitch"].translations - plain.translations
@@ -88,42 +80,29 @@ def test_what_is_hard_about_each(walk):
     assert wrists[0] < -0.1  # the left one is on the right
 
 
-# --- what is measured --------------------------------------------------------------------------------------
-
-
 def trajectory_of(scene, positions):
     return Trajectory(positions, scene.cloth.faces, np.arange(len(positions)) * scene.dt)
 
 
 @pytest.fixture(scope="module")
-def positions(assets, models):
-    """Name of a scene -> the scene, and positions (T,V,3) of skinning and of an untrained network."""
+def roll_outs(assets, models):
+    """Name of a scene -> roll-outs of skinning and of an untrained network there."""
 
-    @cache
-    def run(name):
-        scene, vertices = built(assets, name), {}
+    run = cache(partial(rolled_out, assets, models))
+
+    def made(name):
+        group = SceneRollOuts(run(name, "skinning")[0])
         for method in ("skinning", "snug"):
-            made = find_method(method).make(models=models, seed=0)
-            made.prepare(scene)
-            vertices[method] = made.run().positions
-        return scene, vertices
+            trajectory = trajectory_of(group.scene, run(name, method)[2])
+            group.roll_outs.append(RollOut(group, find_method(method), trajectory, suites=("extremes",)))
+            group.roll_outs[-1].counterpart = run(ORDINARY, method)[2]
+        return {roll_out.entry.name: roll_out for roll_out in group.roll_outs}
 
-    return run
-
-
-def roll_outs(positions, name):
-    """Skinning and an untrained network in the scene, and in the ordinary walk."""
-    (scene, here), (_, walk) = positions(name), positions(ORDINARY)
-    group = SceneRollOuts(scene)
-    for method, x in here.items():
-        entry = find_method(method)
-        group.roll_outs.append(RollOut(group, entry, trajectory_of(scene, x), suites=("extremes",)))
-        group.roll_outs[-1].counterpart = walk[method]
-    return {roll_out.entry.name: roll_out for roll_out in group.roll_outs}
+    return made
 
 
-def test_a_glitch_is_forgotten_or_not(positions):
-    pair = roll_outs(positions, "out_of_distribution/root_glitch")
+def test_a_glitch_is_forgotten_or_not(roll_outs):
+    pair = roll_outs("out_of_distribution/root_glitch")
     free, net = (measure_extrapolation(pair[name]) for name in ("skinning", "snug"))
     assert set(free) == set(net) <= {metric.name for metric in EXTRAPOLATION.metrics}
     assert [free[f"motion/recovery_{after}"] for after in (1, 10, 30)] == [0.0] * 3  # it has no memory
@@ -132,8 +111,8 @@ def test_a_glitch_is_forgotten_or_not(positions):
     assert free["motion/strain_ratio"] == pytest.approx(1.0)
 
 
-def test_another_material_judges_the_same_roll_out(positions):
-    pair = roll_outs(positions, "out_of_distribution/membrane_x10")
+def test_another_material_judges_the_same_roll_out(roll_outs):
+    pair = roll_outs("out_of_distribution/membrane_x10")
     free = measure_extrapolation(pair["skinning"])
     assert free["motion/strain_ratio"] == pytest.approx(10.0)
     assert free["motion/total"] > free["motion/strain"] / 10
@@ -141,23 +120,21 @@ def test_another_material_judges_the_same_roll_out(positions):
 
 
 def test_the_body_of_another_shape_is_seen_by_every_method(assets, models):
-    scene = built(assets, "out_of_distribution/girth_+5")
-    dressed, betas = DressedBody(assets.body, assets.garments["tshirt"]), scene.dressed.betas
-    assert betas.tolist()[:2] == [0.0, 5.0] and len(betas) == assets.body.shape_count
-    model = TrainedModel.load(model_path(models, "snug", 0))
-    by_hand = roll_out(model, dressed, scene.dressed.motion, betas).positions
+    dressed, model = (
+        DressedBody(assets.body, assets.garments["tshirt"]),
+        TrainedModel.load(model_path(models, "snug", 0)),
+    )
     for method in ("snug", "snug+cleanup", "skinning"):
-        made = find_method(method).make(models=models, seed=0)
-        made.prepare(scene)
-        x = made.run().positions
+        scene, made, x = rolled_out(assets, models, "out_of_distribution/girth_+5", method)
+        betas = scene.dressed.betas
+        assert betas.tolist()[:2] == [0.0, 5.0] and len(betas) == assets.body.shape_count
         if method == "snug":
+            by_hand = roll_out(model, dressed, scene.dressed.motion, betas).positions
             assert np.array_equal(x, by_hand)
             still = roll_out(model, dressed, scene.dressed.motion, betas, quasi_static=True)
             assert np.array_equal(made.quasi_static().positions, still.positions)
         if method == "snug+cleanup":
-            clean = CollisionPostProcessing(
-                dressed.garment.rest_positions, dressed.body.shaped(), dressed.body.faces,
-                            scene.obstacle.positions)  # fmt: skip
+            clean = CollisionPostProcessing(dressed, scene.obstacle.positions)
             assert np.array_equal(x, [clean(frame, number) for number, frame in enumerate(by_hand)])
             assert not np.array_equal(x, by_hand)
         depth = scene.obstacle.signed_distance(x[0], 0)
@@ -165,15 +142,12 @@ def test_the_body_of_another_shape_is_seen_by_every_method(assets, models):
     assert scene.start == pytest.approx(dressed.skinned(scene.dressed.motion, betas)[0], abs=0.05)
 
 
-# --- how it is judged --------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("method, far, expected", [
     ("snug", 0.08, "ok"), ("snug", 0.7, "diverged"), ("simulation", 0.7, "ok"), ("snug", np.nan, "diverged"),
 ])  # fmt: skip
-def test_a_network_whose_shirt_is_on_no_body_has_diverged(positions, tmp_path, method, far, expected):
+def test_a_network_whose_shirt_is_on_no_body_has_diverged(roll_outs, tmp_path, method, far, expected):
     """A simulated shirt may be where it likes: of a body that jumps by a metre it has to be left behind."""
-    free = roll_outs(positions, "out_of_distribution/walk_x4")["skinning"]
+    free = roll_outs("out_of_distribution/walk_x4")["skinning"]
     x = free.positions.copy()
     x[3, 7, 0] += far
     whole = bool(np.isfinite(far))
@@ -189,19 +163,16 @@ def test_a_network_whose_shirt_is_on_no_body_has_diverged(positions, tmp_path, m
         ("cell", cell.name): Outcome(*verdict, result={"frames": 5}, files=("x",)),
         ("metrics", cell.name): Outcome(*ended, result=values),
     }
-    rows = list(rows_of_cell(cell, plan_of(tmp_path, (cell,)), {}, outcomes))
+    rows = list(rows_of_cell(cell, Plan(preset=SMOKE, cells=(cell,), folder=tmp_path), {}, outcomes))
     assert {row.status for row in rows} == {expected} and len(rows) == len(values) >= 4
     lost = "a vertex came 0.7 m away from the skinned shirt"
     assert {row.reason for row in rows} == {verdict[1] or (lost if expected == "diverged" else "")}
     assert not any(row.metric.startswith("cost/") for row in rows)  # nobody took its time
 
 
-# --- who takes part, and what is shared --------------------------------------------------------------------
-
-
 def test_one_settled_shirt_serves_all_and_its_task_comes_unasked(assets, tmp_path, monkeypatch):
     words = ("full:extremes", "--scenes", "*splits,*girth_+5", "--methods", "simulation")
-    plan = plan_of(tmp_path, planned(*words).cells)
+    plan = Plan(preset=SMOKE, cells=planned(*words).cells, folder=tmp_path)
     starts = {task.name: task for task in tasks_of(plan) if task.kind == "start"}
     ordinary, splits = "out_of_distribution-ordinary", "out_of_distribution-splits"
     assert list(starts) == [ordinary, splits, "out_of_distribution-girth_+5"]

@@ -76,5 +76,5 @@ def test_the_option_makes_it_the_ground_truth_of_dressed_scenes(monkeypatch):
     without = make_plan(dataclasses.replace(study, self_contact=False))
     assert not any(scene.self_contact for scene in without.scenes)
     monkeypatch.setitem(make_plan.__globals__, "installed", lambda package: False)
-    with pytest.raises(StudyError, match="--self_contact: needs the package ipctk: pip install ipctk"):
+    with pytest.raises(StudyError, match="self_contact: needs the package ipctk: pip install ipctk"):
         make_plan(study)
