@@ -55,6 +55,7 @@ class Dask:
         self.scheduler.wait()
         for worker in self.workers:
             worker.wait(30)
+        self.workers.clear()
         self.start_scheduler(int(self.address.rpartition(":")[2]))
 
     def add(self, *options: str) -> subprocess.Popen:

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import os
-import sys
 import time
 from pathlib import Path
 
 import pytest
 
-from benchmarks.methods.outside import program
-from benchmarks.plan.cell import Cell
 from benchmarks.plan.plan import Plan
 from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder
@@ -21,7 +18,6 @@ from benchmarks.runner.loop import Runner
 from benchmarks.runner.rows import clock_costs, rows_of
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.runner.task import Outcome
-from benchmarks.scenes import find_scene
 from tests.benchmarks.runner.misbehaving import HANGING_CHILD
 from tests.benchmarks.runner.tasks_by_hand import TINY, InProcess, finish, outcome_of, plan_of
 
@@ -84,33 +80,6 @@ def of_session(session: int, word: str = "") -> list[int]:
         if int(its_session) == session and state != "Z" and word in line:
             processes.append(int(path.name))
     return processes
-
-
-LEAVING = """
-import subprocess, sys, time
-child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
-open(sys.argv[3], "w").write(str(child.pid))
-time.sleep(60)
-"""
-LOOKING = """
-import pathlib, sys
-stat = pathlib.Path("/proc", open(sys.argv[3]).read(), "stat")
-sys.exit("it runs on" if stat.exists() and stat.read_text().rpartition(")")[2].split()[0] != "Z" else "gone")
-"""
-
-
-@pytest.mark.slow
-def test_what_a_program_has_started_ends_with_it_before_the_next_cell(tmp_path):
-    cells = []
-    for name, text, seconds in (("leaving", LEAVING, 3.0), ("looking", LOOKING, 60.0)):
-        script = tmp_path / f"{name}.py"
-        script.write_text(text)
-        command = f"{sys.executable} -I {script} {{scene}} {{out}} {tmp_path / 'pid'}"
-        cells.append(Cell(find_scene("free_fall").at(TINY), program(name, command, seconds=seconds), 0, ()))
-    plan = plan_of(tmp_path / "run", cells=tuple(cells))
-    runner = finish(plan, "cells that are not timed", processes=True)
-    first, second = (runner.outcomes["cell", cell.name] for cell in cells)
-    assert first.status == "timeout" and second.reason.endswith("gone")
 
 
 @pytest.mark.slow

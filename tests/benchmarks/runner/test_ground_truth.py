@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-from functools import partial
 
 import h5py
 import numpy as np
@@ -16,7 +15,7 @@ from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Network
 from benchmarks.runner import ground_truth, training_motions
-from benchmarks.runner.ground_truth import simulate_clips, simulate_quasi_static
+from benchmarks.runner.ground_truth import simulate_clips
 from benchmarks.runner.networks import LONGEST, train
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.training import Simulated
@@ -24,8 +23,7 @@ from reference_sim import Trajectory, simulate
 from reference_sim.files.array_file import read_arrays
 from snug.motion.library import TRAIN
 from snug.networks.dressed_body import DressedBody
-from snug.recipe import DEFAULT
-from snug.training.augmentation import CLIP_FRAMES, augment, make_shared_clips
+from snug.training.augmentation import CLIP_FRAMES, make_shared_clips
 from tests.benchmarks.runner.tasks_by_hand import (
     InProcess,
     assets_of,
@@ -64,15 +62,6 @@ def quickly(monkeypatch):
 
     monkeypatch.setattr(ground_truth, "simulated", simulated)
     return odd, asked
-
-
-def test_fewer_shared_clips_are_the_first_of_more_and_those_of_snugs_seed_0():
-    three, one = (make_shared_clips([MOTION], share, vertices=150) for share in (3, 1))
-    assert [len(three), len(one)] == [round(3 * 90 / CLIP_FRAMES), round(90 / CLIP_FRAMES)]
-    clips = augment([MOTION], dataclasses.replace(DEFAULT, mixed=3.0), vertices=150, seed=0)
-    assert all(np.array_equal(a.poses, b.poses) for a, b in zip(one, three))
-    assert all(np.array_equal(a.poses, b.poses) for a, b in zip(clips, three, strict=True))
-    assert make_shared_clips([MOTION], 0, vertices=150) == []
 
 
 def test_parts_are_all_clips_once_and_what_is_not_whole_is_left_out(tmp_path, quickly):
@@ -115,19 +104,6 @@ def test_a_clip_is_simulated_as_its_motion_would_be(tmp_path):
     assert (
         np.array_equal(positions, trajectory.positions.astype(np.float32)) and len(positions) == CLIP_FRAMES
     )
-
-
-def test_poses_held_still_say_how_many_of_them_did_not_converge(tmp_path, monkeypatch):
-    import reference_sim
-
-    scene, assets = dressed_scene(MOTION.name), assets_of(tube_dress(), MOTION)
-    worn = dataclasses.replace(scene.build(assets), frames=5)
-    assert worn.start.shape  # it has come to rest
-    monkeypatch.setattr(ground_truth, "build_scene", lambda *_: worn)
-    monkeypatch.setattr(reference_sim, "simulate", partial(simulate, max_iterations=1))
-    outcome = simulate_quasi_static(scene, context(tmp_path, assets), {})
-    assert outcome.status == "ok"
-    assert outcome.result == {"status": "max_iterations", "frames_not_converged": 4}
 
 
 def test_a_network_learns_from_given_motions_and_from_the_clips_that_are_there(tmp_path, quickly):
@@ -184,15 +160,10 @@ def test_a_training_of_equal_data_has_the_steps_and_clips_that_it_declares(tmp_p
         assert task.motions == ("walk", "run")
         assert task.steps == plan.preset.steps["snug"] * (LONGEST if training.converged else 1)
         assert task.held_out == (("bow",) if training.converged else ())
-    alone = dataclasses.replace(plan, motions=Motions(train=("walk",), test=("kick",)))
-    network = Network("snug", 0, "tshirt", find_method("snug-data-converged-0").training)
-    task = Schedule(alone).training(network)  # a single motion cannot be held out
-    assert task.motions == ("walk",) and task.held_out == () and network.training.converged
 
 
-@pytest.mark.parametrize("kind", [pytest.param("snug", marks=pytest.mark.slow), "supervised"])
-def test_a_training_goes_on_until_held_out_motions_get_no_better(tmp_path, monkeypatch, kind):
-    entry = find_method(f"{kind}-data-converged-0")
+def test_a_training_goes_on_until_held_out_motions_get_no_better(tmp_path, monkeypatch):
+    entry = find_method("supervised-data-converged-0")
     held = dataclasses.replace(swaying(20, degrees=30.0), name="held")
     motion = dataclasses.replace(swaying(30), name="given")
     assets = assets_of(tube_dress(), motion)
@@ -205,7 +176,7 @@ def test_a_training_goes_on_until_held_out_motions_get_no_better(tmp_path, monke
     task = dataclasses.replace(
         training("supervised", "given", steps=200), held_out=("held",),
         network=Network(entry.trained, 0, "tshirt", entry.training),
-        simulated={id[1]: id for id in needed} if kind == "supervised" else {},
+        simulated={id[1]: id for id in needed},
     )  # fmt: skip
     values = iter([5.0, 3.0, *[4.0] * 200])
     monkeypatch.setattr("snug.training.validation.Validator.value", lambda self: next(values))

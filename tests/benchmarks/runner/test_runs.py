@@ -16,12 +16,10 @@ import pytest
 from benchmarks import run
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution
-from benchmarks.runner.cache import dependencies
 from benchmarks.runner.rows import rows_of
 from benchmarks.runner.run_json import RunLog
-from benchmarks.runner.schedule import tasks_of
 from benchmarks.validation.case import Case
-from benchmarks.validation.registry import CASES, KNOWN_ANSWERS, STRESS_TESTS
+from benchmarks.validation.registry import KNOWN_ANSWERS
 from tests.benchmarks.runner.tasks_by_hand import InProcess, finish, plan_of, run_in_this_process
 from tests.benchmarks.runner.test_cells import of_session
 from tests.benchmarks.runner.test_tasks import task
@@ -245,12 +243,3 @@ def test_a_case_is_computed_once_and_again_when_it_declares_something_else(tmp_p
     again, runner = rows_of_cases(tmp_path, off)
     assert [(r.status, r.reason) for r in again] == [("failed", failed.reason)] and len(runner.reused) == 1
     assert f"case {known.name}: cached (failed: " in execution.describe(plan_of(tmp_path, cases=(off,)))
-
-
-def test_every_case_has_an_identity_of_its_own_and_depends_on_no_report(tmp_path):
-    tasks = tasks_of(plan_of(tmp_path, cases=CASES))
-    assert len({task.id for task in tasks}) == len(tasks) == len(CASES)
-    (stress,) = tasks_of(plan_of(tmp_path, cases=STRESS_TESTS[:1]))
-    places = set(dependencies(stress))
-    assert {"benchmarks/validation", "reference_sim"} <= places
-    assert not any(place.startswith(("reports", "benchmarks/plan")) for place in places)
