@@ -6,7 +6,6 @@ import dataclasses
 import json
 import math
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -38,8 +37,8 @@ ROLES = (
     "warm-started", "",
 )  # fmt: skip
 
-OF_TRAINING = ("cost/setup", "cost/train")  # [s] a network, on the machine that trained it
-BEFORE_FRAMES = ("cost/data", *OF_TRAINING)  # [s] all that it costs before its first frame
+# [s] all that a network costs before its first frame
+BEFORE_FRAMES = ("cost/data", "cost/setup", "cost/train")
 DECLARED = "declared by its author, not measured"  # reason of such a run time
 PRETRAINED = "pretrained network"  # how the remark begins that a row's network is of a file
 
@@ -179,14 +178,3 @@ def cells_to_row(cells: dict[str, str]) -> Row:
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise ResultsError(f"{type(error).__name__}: {error}") from None
     return Row(**values)
-
-
-def with_provenance(rows: Iterable[Row], **provenance: Any) -> list[Row]:
-    """Return the rows with their provenance columns (preset, commit, hardware, ...) filled in.
-
-    What an earlier run measured names its own, and keeps it.
-    """
-    return [
-        dataclasses.replace(row, **{name: getattr(row, name) or value for name, value in provenance.items()})
-        for row in rows
-    ]

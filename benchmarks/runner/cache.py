@@ -24,8 +24,6 @@ from benchmarks.results.run_folder import FORMAT, RunFolder
 from benchmarks.runner.task import Outcome, Task
 from reference_sim.files.atomic_files import replacing
 
-NOWHERE: Mapping[str, Any] = {}
-
 
 @dataclasses.dataclass(frozen=True)
 class Cached:
@@ -56,9 +54,9 @@ class Cache:
     """Entries of one run's folder. retry: whether failed tasks are done again; origin: see Outcome."""
 
     def __init__(
-        self, folder: RunFolder, *, retry: bool = False, origin: Mapping[str, Any] = NOWHERE
+        self, folder: RunFolder, *, retry: bool = False, origin: dict[str, Any] | None = None
     ) -> None:
-        self.folder, self.retry, self.origin = folder, retry, origin
+        self.folder, self.retry, self.origin = folder, retry, origin or {}
 
     def find(self, task: Task, others: Mapping[TaskId, Cached]) -> Cached:
         """Return the entry of a task. others: entries of the tasks that it reads."""
@@ -83,7 +81,7 @@ class Cache:
     def keep(self, task: Task, outcome: Outcome, others: Mapping[TaskId, Cached]) -> Cached:
         """Write the entry, after the files, and return it."""
         files = {name: digest_of_file(self.folder.path / name) for name in outcome.files}
-        outcome = dataclasses.replace(outcome, digests=files, origin={**self.origin, **outcome.origin})
+        outcome = dataclasses.replace(outcome, digests=files, origin=self.origin | outcome.origin)
         entry = {
             "format": FORMAT,
             "task": task.title,

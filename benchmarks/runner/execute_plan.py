@@ -20,7 +20,7 @@ from benchmarks.runner.loop import Runner
 from benchmarks.runner.rows import rows_of
 from benchmarks.runner.run_json import RunLog, now
 from benchmarks.runner.schedule import tasks_of
-from benchmarks.runner.task import RunRefused, RunStopped, one_line
+from benchmarks.runner.task import RunRefused, one_line
 
 if TYPE_CHECKING:
     from benchmarks.assets import Assets
@@ -78,15 +78,12 @@ def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) ->
 
 
 def executor_of(plan: Plan, folder: RunFolder, assets: Assets | None) -> Executor:
-    """Return the executor of the plan's tasks. Raises RunStopped where its cluster is gone."""
+    """Return the executor of the plan's tasks. Raises RunRefused where its cluster is gone."""
     if not plan.scheduler:
         return Executor(folder, assets, plan.workers)
     from benchmarks.runner.cluster import Cluster  # loads dask
 
-    try:
-        return Executor(folder, assets, plan.workers, Cluster(folder, assets, plan.scheduler))
-    except RunRefused as error:
-        raise RunStopped(str(error)) from None
+    return Executor(folder, assets, plan.workers, Cluster(folder, assets, plan.scheduler))
 
 
 def check_roll_outs(plan: Plan) -> Assets | None:

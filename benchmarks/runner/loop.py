@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import nullcontext
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from benchmarks.plan.cell import TaskId
@@ -41,7 +42,8 @@ class Runner:
     def refuse(self, kinds: Sequence[str], reason: str) -> None:
         """Let all tasks of these kinds fail, for the same reason; nothing of it is kept."""
         ids = [task.id for task in self.tasks if task.id[0] in kinds]
-        self.outcomes |= dict.fromkeys(ids, Outcome("failed", reason, failed=True))
+        refused = Outcome("failed", reason, failed=True, origin=self.cache.origin)
+        self.outcomes |= dict.fromkeys(ids, refused)
 
     # --- running -------------------------------------------------------------------------------------------
 
@@ -107,7 +109,7 @@ class Runner:
             for name in task.files:
                 (self.cache.folder.path / name).unlink(missing_ok=True)
             return True
-        self.outcomes[task.id] = found.outcome
+        self.outcomes[task.id] = replace(found.outcome, origin=self.cache.origin | found.outcome.origin)
         if found.content:
             self.cached[task.id] = found
             self.reused.append(task.title)

@@ -123,10 +123,18 @@ def train(job: NetworkTraining, context: Context, needed: Needed) -> Outcome:
             every=EVERY, device=job.device, checkpoint=checkpoint, validation=validation,
         )  # fmt: skip
     model.origin = origin_of(job, needed, left_out=[name for name in job.motions if name not in motions])
+    outcome = _outcome(model, job, run, {})
+    checkpoint.delete()
+    return outcome
+
+
+def _outcome(model: TrainedModel, job: NetworkTraining, run: RunFolder, facts: dict[str, Any]) -> Outcome:
+    """Write the model; the outcome names the machine that trained it."""
+    path = job.path(run)
     path.parent.mkdir(parents=True, exist_ok=True)
     model.save(path)
-    checkpoint.delete()
-    return Outcome(result=facts_of(model), files=(run.relative(path),))
+    origin = {"hardware": provenance.hardware_line(model.origin["hardware"])}
+    return Outcome(result=facts_of(model) | facts, files=(run.relative(path),), origin=origin)
 
 
 def origin_of(job: NetworkTraining, needed: Needed, *, left_out: list[str]) -> dict[str, Any]:
@@ -212,22 +220,13 @@ def pretrained_network(job: NetworkTraining, folder: Path) -> tuple[Path | None,
 
 
 def take(job: NetworkTraining, source: Path, context: Context, needed: Needed) -> Outcome:
-    """Copy a network, once it is known to be whole. The outcome names the machine that trained it."""
+    """Copy a network, once it is known to be whole."""
     from snug.networks.trained_model import TrainedModel
 
-    model, path = TrainedModel.load(source), job.path(context.folder)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    model.save(path)
-    facts = {
-        NAME: source.stem,
-        "trained_at": model.origin["commit"],
-        "data_seconds": model.origin["data_seconds"],
-    }
-    return Outcome(
-        result=facts_of(model) | facts,
-        files=(context.folder.relative(path),),
-        origin={"hardware": provenance.hardware_line(model.origin["hardware"])},
-    )
+    model = TrainedModel.load(source)
+    origin = model.origin
+    facts = {NAME: source.stem, "trained_at": origin["commit"], "data_seconds": origin["data_seconds"]}
+    return _outcome(model, job, context.folder, facts)
 
 
 def put_into_package(run: str | Path, package: Path = FOLDER) -> list[str]:

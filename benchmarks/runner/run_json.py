@@ -16,7 +16,7 @@ from benchmarks.plan.plan import Plan
 from benchmarks.provenance import digest, digest_of_file
 from benchmarks.results import run_folder
 from benchmarks.results.protocol import DIGEST, NUMBER
-from benchmarks.results.row import OF_TRAINING, Row, with_provenance
+from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.loop import Runner
@@ -36,7 +36,7 @@ class RunLog:
         body, garment = plan.inputs.body, plan.inputs.garment
         self.folder = RunFolder(plan.folder)
         self.hardware = provenance.hardware(plan.device)
-        # Only training uses an accelerator: its rows name it, see write_rows.
+        # Only training uses an accelerator: its rows name it, see networks.train.
         hardware = provenance.hardware_line(self.hardware | {"accelerator": None})
         self.origin = {
             "commit": provenance.commit(), "preset": plan.preset.name, "protocol": NUMBER,
@@ -133,13 +133,7 @@ class RunLog:
 
     def write_rows(self, rows: Sequence[Row]) -> None:
         """results.csv, energies of frames, and what run.json says of them."""
-        everything = provenance.hardware_line(self.hardware)
-        self.rows = [
-            dataclasses.replace(row, hardware=everything)
-            if row.metric in OF_TRAINING and row.hardware == self.origin["hardware"]
-            else row
-            for row in with_provenance(rows, **self.origin)
-        ]
+        self.rows = list(rows)
         self.count_look()
         self.folder.write_rows(self.rows)
         run_folder.write_frame_energies(self.folder, self.rows)

@@ -159,7 +159,7 @@ class Schedule:
         return Task(
             kind="data", name=f"{flat(scene.name)}/{flat(entry.name)}", label=_label(scene.name, entry),
             stage="ground truth", silent=True, run=partial(simulate_motion, scene, entry),
-            **self._simulated_by(entry, scene),
+            **self._of_scene(scene, *code_behind(entry), method=declared(entry)),
         )  # fmt: skip
 
     def clips(self, garment: str, simulated: Simulated, motions: tuple[str, ...], part: int) -> Task:
@@ -167,14 +167,14 @@ class Schedule:
         entry = find_method(simulated.method)
         clips = clips_of(garment, motions)
         scene = of_garment(garment, self.plan.motions.worn).scene(motions[0]).at(self.preset)
-        of_scene = self._simulated_by(entry, scene)
         mixed_of = {name: self._motion(name) for name in motions}
         return Task(
             kind="clips", name=f"{flat(clips)}/{flat(entry.name)}-{part}",
             label=_label(f"{garment}, mixed clips of {len(motions)} motions, part {part}", entry),
             stage="ground truth", silent=True, run=partial(simulate_clips, scene, entry, motions, part),
-            inputs=of_scene["inputs"] | {"part": part, "motions": mixed_of},
-            code=of_scene["code"],
+            **self._of_scene(
+                scene, *code_behind(entry), method=declared(entry), part=part, motions=mixed_of
+            ),
         )  # fmt: skip
 
     def network(self, network: Network) -> Task:
@@ -254,8 +254,8 @@ class Schedule:
 
     def cell(self, cell: Cell) -> Task:
         """Return the task that runs a cell: alone where it is timed."""
-        of_scene = self._of_scene(cell.scene, *code_behind(cell.entry))
-        inputs, entry = of_scene["inputs"] | {"method": declared(cell.entry)}, cell.entry
+        entry = cell.entry
+        inputs: dict[str, Any] = {"method": declared(entry)}
         if cell.timed:
             inputs["least"] = self._least(cell)
         if entry.seeded:
@@ -264,8 +264,8 @@ class Schedule:
         if network := network_of(cell):
             needs = (*needs, network.task_id)
         fields: dict[str, Any] = {
-            "skip": entry.skip(cell.scene) or "", "files": files_of(cell, self.folder),
-            "inputs": inputs, "code": of_scene["code"], "needs": needs,
+            "skip": entry.skip(cell.scene) or "", "files": files_of(cell, self.folder), "needs": needs,
+            **self._of_scene(cell.scene, *code_behind(entry), **inputs),
         }  # fmt: skip
         if cell.timed:
             return self._timed(cell, cell.task_id, run_cell, **fields)
@@ -312,22 +312,18 @@ class Schedule:
             reads = (*reads, quasi_static_id(scene))
         wanted = (scene.counterpart, cell.method, cell.seed)
         reads += tuple(c.task_id for c in plan.cells if (c.scene.name, c.method, c.seed) == wanted)
-        of_scene = self._of_scene(scene, *MEASURING, *users_code(*plan.metrics))
-        inputs = {
-            "suites": sorted(cell.suites),
-            "samples": self.preset.gap_samples,
-            "method": [
-                entry.role, entry.reporting.family, entry.reporting.level, entry.static_known,
-                entry.other_mesh,
-            ],
-            "metrics": scene.metrics,
-        }  # fmt: skip
+        method = [
+            entry.role, entry.reporting.family, entry.reporting.level, entry.static_known, entry.other_mesh,
+        ]  # fmt: skip
         run = partial(measure_cell, cell, cells, self.preset.gap_samples, plan.metrics)
         return Task(
             kind="metrics", name=cell.name, label=cell.label, stage="metrics",
             run=run, needs=(cell.task_id,), reads=reads, batch=scene.name,
             files=(self.folder.relative(self.folder.curves_path(*cell.key)),),
-            inputs=of_scene["inputs"] | inputs, code=of_scene["code"],
+            **self._of_scene(
+                scene, *MEASURING, *users_code(*plan.metrics), suites=sorted(cell.suites),
+                samples=self.preset.gap_samples, method=method, metrics=scene.metrics,
+            ),
         )  # fmt: skip
 
     def case(self, case: Case) -> Task:
@@ -351,20 +347,18 @@ class Schedule:
     def _hardware(self) -> dict[str, Any]:
         return provenance.hardware(self.plan.device)
 
-    def _of_scene(self, scene: Scene, *code: str) -> dict[str, Any]:
-        """Return inputs and code of a task that builds the scene; its metrics are no part of them."""
+    def _of_scene(self, scene: Scene, *code: str, **inputs: Any) -> dict[str, Any]:
+        """Return inputs and code of a task that builds the scene, these included; its metrics are no part."""
         declaration = declared(scene) | {"timed": scene.timed, "dynamic": scene.dynamic}
         del declaration["metrics"], declaration["counterpart"]
-        inputs = self._machine() | {"scene": declaration}
-        code = (*code, *RUNNING, *code_behind(scene))
-        if not scene.dressed:
-            return {"inputs": inputs, "code": code}
-        inputs |= self._of_body(scene.garment) | {"motion": self._motion(scene.motion)}
-        if scene.motion not in self.plan.motions.train:  # those have a length of their own
-            inputs["frames"] = self.preset.frames
+        inputs |= self._machine() | {"scene": declaration}
+        if scene.dressed:
+            inputs |= self._of_body(scene.garment) | {"motion": self._motion(scene.motion)}
+            if scene.motion not in self.plan.motions.train:  # those have a length of their own
+                inputs["frames"] = self.preset.frames
         if scene.part == "clip":
             inputs["clip_frames"] = self.preset.clip_frames
-        return {"inputs": inputs, "code": code}
+        return {"inputs": inputs, "code": (*code, *RUNNING, *code_behind(scene))}
 
     def _of_body(self, garment: str) -> dict[str, Any]:
         """Return the inputs that the assets are made from."""
@@ -384,11 +378,6 @@ class Schedule:
         """
         files = self.plan.inputs.motions
         return f"{name} {digest(files[name])}" if name in files else name
-
-    def _simulated_by(self, entry: MethodEntry, scene: Scene) -> dict[str, Any]:
-        """Return inputs and code of a task that simulates a scene by a method, to learn from."""
-        of_scene = self._of_scene(scene, *code_behind(entry))
-        return of_scene | {"inputs": of_scene["inputs"] | {"method": declared(entry)}}
 
     # --- facts of the plan ---------------------------------------------------------------------------------
 

@@ -30,7 +30,7 @@ class Outcome:
         files: names of the files that it has left in the run's folder.
         digests: name -> digest of these files, once the outcome is kept.
         seconds: wall time [s].
-        origin: commit, preset and hardware of it, once the outcome is kept.
+        origin: commit, preset, protocol and hardware of it, once the outcome is known to a run.
     """
 
     status: str = "ok"
@@ -40,7 +40,7 @@ class Outcome:
     files: tuple[str, ...] = ()
     digests: Mapping[str, str] = field(default_factory=dict)
     seconds: float = 0.0
-    origin: Mapping[str, Any] = field(default_factory=dict)
+    origin: dict[str, Any] = field(default_factory=dict)
 
     @property
     def ending(self) -> str:

@@ -9,7 +9,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from benchmarks import provenance
 from benchmarks.methods import find_method
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
@@ -118,16 +117,6 @@ def test_an_extreme_case_may_fail_honestly_and_nothing_else_may():
     assert accepted(row("extremes", "stalled")) and accepted(row("garments", "skipped"))
     assert not accepted(row("extremes", "failed")) and not accepted(row("garments", "stalled"))
     assert not accepted(row("extremes", "stalled", ""))
-
-
-def test_the_accelerator_is_on_the_rows_of_training_alone(tmp_path, monkeypatch):
-    facts = {"processor": "a processor", "cores": 2, "device": "cuda", "accelerator": "a GPU"}
-    monkeypatch.setattr(provenance, "hardware", lambda device: facts)
-    log = RunLog(plan_of(tmp_path, device="cuda"))
-    metrics = ("cost/train", "cost/frame")
-    log.write_rows([Row("garments", "tshirt/kick", "snug", 0, metric, "s", 1.0) for metric in metrics])
-    machines = {row.metric: row.hardware for row in log.folder.read_rows()}
-    assert machines == {"cost/train": "a GPU, a processor (2 cores)", "cost/frame": "a processor (2 cores)"}
 
 
 def test_a_run_that_has_just_begun_leaves_what_the_rows_there_mean(tmp_path):
