@@ -66,11 +66,6 @@ def scored(tmp_path_factory):
     return folder
 
 
-@pytest.fixture
-def copy(scored, tmp_path):
-    return Path(shutil.copytree(scored, tmp_path / "waving"))
-
-
 def test_scores_are_those_of_a_run_without_clock_and_machine_and_the_same_bytes_twice(scored, entry):
     rows = RunFolder(scored / "scores").read_rows()
     mine = {row.metric: row for row in rows if row.method == "waving"}
@@ -85,7 +80,8 @@ def test_scores_are_those_of_a_run_without_clock_and_machine_and_the_same_bytes_
 
 
 @pytest.mark.parametrize("name", [f"{SCENE}.npz", "scores/results.csv", ".weights"])
-def test_a_file_that_is_not_as_it_was_scored_is_refused(copy, name, refused):
+def test_a_file_that_is_not_as_it_was_scored_is_refused(scored, tmp_path, name, refused):
+    copy = Path(shutil.copytree(scored, tmp_path / "waving"))
     with (copy / name).open("ab") as file:
         file.write(b"\n")
     refused(f"not as it was scored: {name}: put it right", main, ["check", str(copy)])
@@ -94,11 +90,7 @@ def test_a_file_that_is_not_as_it_was_scored_is_refused(copy, name, refused):
 @pytest.mark.parametrize(
     ("old", "new", "fault"),
     [
-        (
-            f'protocol = "{NUMBER}"',
-            'protocol = "0.9"',
-            f"protocol = '0.9': this is protocol {NUMBER}",
-        ),
+        (f'"{NUMBER}"', '"0.9"', f"protocol = '0.9': this is protocol {NUMBER}"),
         ('title = "Waving"\n', "", "missing 1 required keyword-only argument: 'title'"),
         ("milliseconds = 2.5", "milliseconds = nan", "milliseconds = nan: give a number above 0"),
         ("seeds = [0]", "seeds = [0]\ncolour = 1", "no field is called 'colour'"),
@@ -125,9 +117,7 @@ def test_a_program_of_another_name_or_that_fails_within_a_scene_is_not_scored(
     entry, capsys, name, spoilt, fault
 ):
     file = f"{name}_program.py"  # which Python has not met
-    text = METHOD_FILE.replace('"still"', f'"{name}"').replace(
-        "return Traj", f"{spoilt}\n        return Traj"
-    )
+    text = METHOD_FILE.replace('"still"', f'"{name}"').replace("pass", spoilt)
     (entry / "entry.toml").write_text(TEXT.replace("roll_outs", "program").replace("{scene}.npz", file))
     (entry / file).write_text(text)
     assert main(["score", str(entry)]) == 2

@@ -10,14 +10,7 @@ import pytest
 from benchmarks.method import MethodEntry
 from benchmarks.methods import find_method
 from benchmarks.metrics import dynamics
-from benchmarks.metrics.dynamics import (
-    HemMotion,
-    amplitude,
-    correlation,
-    gain_and_lag,
-    hem_yaw,
-    response,
-)
+from benchmarks.metrics.dynamics import HemMotion, amplitude, correlation, gain_and_lag, hem_yaw, response
 from benchmarks.scene import BuiltScene, Dressed
 from tests.benchmarks.runner.tasks_by_hand import grouped
 from tests.snug.training.dressing import AROUND, swaying, tube_dress

@@ -10,16 +10,9 @@ import pytest
 
 from benchmarks.meshes import icosphere, right_grid
 from benchmarks.metrics import find_metric
-from benchmarks.metrics.curvature import (
-    CurvatureSeries,
-    histogram_distance,
-)
+from benchmarks.metrics.curvature import CurvatureSeries, histogram_distance
 from benchmarks.metrics.energy import energy_series
-from benchmarks.metrics.penetration_and_distances import (
-    distance_rms,
-    own_part_depth,
-    penetration,
-)
+from benchmarks.metrics.penetration_and_distances import distance_rms, own_part_depth, penetration
 from benchmarks.metrics.scene_facts import inside_itself, measure_body
 from benchmarks.metrics.self_intersections import self_intersections
 from reference_sim import Obstacle, simulate
@@ -110,9 +103,8 @@ def test_own_part_depth_does_not_see_the_limb_beside():
     belongs = np.array([[0.11, 0.0, 0.0], [0.101, 0.0, 0.0]])
     # The ball is a mesh: its faces lie up to 1 % of the radius below the sphere.
     assert own_part_depth(x, obstacle, belongs)[0] == pytest.approx([0.0, 0.01], abs=1e-3)
-    assert penetration([x], [np.zeros((0, 3), int)], obstacle)[0].depth[0] == pytest.approx(
-        [0.05, 0.01], abs=1e-3
-    )
+    depth = penetration([x], [np.zeros((0, 3), int)], obstacle)[0].depth[0]
+    assert depth == pytest.approx([0.05, 0.01], abs=1e-3)
 
 
 def test_histogram_distance_is_the_shift_of_a_distribution_and_blind_to_places():
@@ -168,9 +160,8 @@ def test_the_worst_frame_is_found_beyond_what_is_so_at_rest_and_in_the_reference
     obstacle = Obstacle(np.stack([two_spheres(apart)[0] for apart in (0.2, 1.5, 0.5, 1.0)]), faces)
     body = SimpleNamespace(shaped=lambda betas: two_spheres(1.5)[0])
     scene = SimpleNamespace(obstacle=obstacle, dressed=SimpleNamespace(body=body, betas=None), warm_up=1)
-    roll_out = SimpleNamespace(
-        scene=scene, positions=np.zeros((4, 1, 3)), entry=SimpleNamespace(role="reference")
-    )
+    entry = SimpleNamespace(role="reference")
+    roll_out = SimpleNamespace(scene=scene, positions=np.zeros((4, 1, 3)), entry=entry)
     metrics = measure_body(roll_out)
     assert metrics["body/self_intersection"] == pytest.approx(100 * (0.375 - 0.125), abs=2.0)
     assert metrics["body/self_intersection_frame"] == 2.0

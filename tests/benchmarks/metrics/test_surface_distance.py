@@ -91,9 +91,8 @@ def test_penetration_is_measured_of_another_mesh():
     frames = np.repeat(in_space(COARSE[0])[None], 3, axis=0)  # x = 0, 1/4 ... 1 in equal numbers
     metrics = measure(roll_out(frames, COARSE[1], other_mesh=True, obstacle=slab))
     assert metrics["penetration/vertices"] == pytest.approx(20.0)
-    assert metrics["penetration/surface"] == pytest.approx(
-        25.0 * (1 - 17 / 120)
-    )  # what lies in the plane is outside
+    # What lies in the plane is outside.
+    assert metrics["penetration/surface"] == pytest.approx(25.0 * (1 - 17 / 120))
     assert metrics["penetration/deep"] == pytest.approx(20.0)
     assert metrics["penetration/depth_p99"] == pytest.approx(250.0)
     assert measure(roll_out(frames, COARSE[1], other_mesh=True)) == {}

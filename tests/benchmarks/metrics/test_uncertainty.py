@@ -69,11 +69,8 @@ def test_a_start_is_moved_by_its_shift_and_in_no_two_runs_alike(tmp_path):
 def test_numbers_of_the_reference_are_as_uncertain_as_its_ensemble_spreads():
     def row(method, metric, value, uncertainty=None):
         entry = find_method(method)
-        return Row(
-            "garments", "tshirt/x", method, 0, metric, "J", value, role=entry.role,
-            family=entry.reporting.family, level=entry.reporting.level,
-            uncertainty=uncertainty,
-        )  # fmt: skip
+        more = {"role": entry.role, "family": entry.reporting.family, "level": entry.reporting.level}
+        return Row("garments", "tshirt/x", method, 0, metric, "J", value, uncertainty=uncertainty, **more)
 
     rows = [
         row("simulation", "energy/total", 1.0), row("simulation", "cost/frame", 5.0),
@@ -107,11 +104,8 @@ def test_means_are_over_the_judged_frames_alone():
     last = grouped(scene, {"simulation": x, "newton-1": late}).roll_outs[1]
     assert energy.measure_energy(last)["energy/strain"] > 2.0 * energy.measure_energy(one)["energy/strain"]
     # What ended in the warm-up has no number.
-    assert measured(grouped(scene, {"newton-1": x[:3]}, suites=("garments",)).roll_outs[0]) == (
-        {},
-        {},
-        ("ok", ""),
-    )
+    ended = grouped(scene, {"newton-1": x[:3]}, suites=("garments",)).roll_outs[0]
+    assert measured(ended) == ({}, {}, ("ok", ""))
 
 
 def test_dynamics_are_told_by_the_own_static_answer_and_by_the_simulators(monkeypatch):
