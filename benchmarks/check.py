@@ -96,13 +96,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def plan_of(path: str, study: Study, folder: Path) -> Plan:
     """Return the plan of all that a file declares: methods in tiny scenes, its scenes and metrics simulated.
 
-    Args:
-        path: of the file.
-        study: whose scenes, where it names some, take the place of the tiny ones: methods alone meet them.
-        folder: of the run.
-
-    Raises:
-        ValueError: one line, where a run with the file would raise too, or for a file that declares nothing.
+    Scenes that the study names take the place of the tiny ones; methods alone meet them. Raises ValueError
+    where a run with the file would raise too, and for a file that declares nothing.
     """
     module = user_files.import_file(user_files.file_of(path))
     wanted = user_files.KINDS[:1] if study.scenes else user_files.KINDS
@@ -123,11 +118,7 @@ def plan_of(path: str, study: Study, folder: Path) -> Plan:
 
 
 def faults_of(plan: Plan) -> Iterator[tuple[str, str]]:
-    """Run a plan by the ordinary runner, and check what methods and scenes of a user do.
-
-    Yields:
-        Each entry in each scene, and what is wrong with it there, or empty.
-    """
+    """Run a plan by the ordinary runner; yield each entry in each scene, and what is wrong with it, or ""."""
     skipped = {cell: cell.entry.skip(cell.scene) for cell in plan.cells}
     cells = tuple(cell for cell in plan.cells if not skipped[cell])
     for cell in {cell.method: cell for cell in plan.cells}.values():
@@ -191,16 +182,9 @@ def demand(*claims: tuple[object, str]) -> None:
 
 
 def check_method(entry: MethodEntry, scene: BuiltScene, make: Callable[..., Method], seed: int) -> None:
-    """Run a method twice, and with another seed, and check what it has done.
+    """Run a method twice with a seed, and with another one, and check what it has done.
 
-    Args:
-        entry: of the method.
-        scene: which is to stay as it is.
-        make: called with `seed`, returns a new method.
-        seed: of the first two runs.
-
-    Raises:
-        ContractError: the demands that are not met.
+    make(seed=seed) returns a new method. Raises ContractError with the demands that are not met.
     """
     before = fingerprints(scene)
 

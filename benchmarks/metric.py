@@ -13,6 +13,7 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from benchmarks.declarations import load
 from benchmarks.results.protocol import is_member
@@ -24,6 +25,10 @@ if TYPE_CHECKING:
     from reference_sim.trajectory import Trajectory
 
 Made = TypeVar("Made")
+Floats = NDArray[np.float64]
+Positions = Floats  # (T,V,3) [m] of a roll-out
+Vertices = Floats  # (V,3) [m] of a frame
+Faces = NDArray[np.int64]  # (F,3) triangles, outward
 NUMBERS_OF = ("answer", "method", "machine")
 COMPARED_WITH = ("reference", "reference-variant", "bound")  # roles of what others are measured beside
 

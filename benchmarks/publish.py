@@ -69,16 +69,10 @@ def published_studies() -> list[str]:
 
 
 def publish(name: str, out: Path, into: Path, head: str) -> None:
-    """Run a study, or go on with it, and keep what is published of it.
+    """Run the study of that name or path below `out`, or go on with it; keep below `into` what is published.
 
-    Args:
-        name: of the study, or its path.
-        out: folder of the run's folder.
-        into: folder of published runs.
-        head: commit that all rows have to name.
-
-    Raises:
-        ResultsError: the run failed, has rows of another commit, or lacks a picture that the documents show.
+    Raises ResultsError where the run failed, has rows of another commit than `head`, or lacks a picture that
+    the documents show.
     """
     show, whole = read_study(name).show, out / Path(name).stem
     assert show is not None
@@ -117,8 +111,7 @@ def all_usable(folder: RunFolder) -> bool:
 def keep(whole: Path, target: Path, shown: Sequence[str]) -> None:
     """Replace the folder `target` by what is published of the run in `whole`.
 
-    Raises:
-        ResultsError: a picture or film of these names is not there.
+    Raises ResultsError where a picture or film of the names in `shown` is not there.
     """
     kept = [whole / name for name in KEPT if name != "frame_energies.csv" or (whole / name).exists()]
     kept += [whole / "tables", *(whole / "figures" / name for name in shown)]

@@ -102,16 +102,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def score(
     roll_out: str | Path, scene: str = "", *, study: Study | None = None, **more: Any
 ) -> dict[str, Any]:
-    """Evaluate a roll-out in a scene and return the numbers, without figures, page and PDF.
+    """Evaluate a roll-out in a scene and return its `numbers`, without figures, page and PDF.
 
     Args:
         roll_out: a file, a folder or a pattern, as the command takes it.
         scene: its name, as "tshirt/kick".
         study: whose body, garment, motions and sizes the scene has; None: study default.
         more: `rest_mesh`, `reference` and `folder` of `plan_score`.
-
-    Returns:
-        What `numbers` returns.
 
     Raises:
         ValueError: one line, where the roll-out cannot be read or does not belong to the scene, or where the
@@ -150,9 +147,6 @@ def plan_score(
         report: whether times and gaps of what the roll-out is compared with are measured.
         folder: of the run; None: a new one.
         command_line: for run.json.
-
-    Raises:
-        ValueError: one line for the first thing that cannot be met.
     """
     name, table = parse_roll_out(roll_out, named=False)
     stored = read_study(options=[option("rollouts", {name: table})]).rollouts[name]
@@ -197,10 +191,9 @@ def _reference(cell: Cell, given: str | Path | Literal[False] | None) -> Cell:
 
 
 def numbers(plan: Plan, status: int) -> dict[str, Any] | None:
-    """Return what a run found of the roll-out, ready for JSON; None where it ended before.
+    """Return name, scene, status ("ok", or the first other one), reason, metrics and folder of the roll-out.
 
-    Returns:
-        name, scene, status ("ok", or the first other one), reason, metrics (name -> value and unit), folder.
+    Metrics are name -> value and unit. None where the run ended before the roll-out was evaluated.
     """
     folder, name = RunFolder(plan.folder), plan.cells[-1].method
     if status not in (0, 1) or not folder.rows_path.is_file():

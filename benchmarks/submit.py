@@ -131,11 +131,7 @@ class Entry:
         }
 
     def plan(self, folder: Path) -> Plan:
-        """Return the plan that scores the entry: beside the simulation and skinning, without a clock.
-
-        Raises:
-            ValueError: one line for what cannot be met.
-        """
+        """Return the plan that scores the entry: beside the simulation and skinning, without a clock."""
         metadata = self.metadata
         option = RollOutOption(self.name, str(self.path / metadata.roll_outs), ms=metadata.milliseconds)
         programs = (str(self.path / metadata.program),) if metadata.program else ()
@@ -206,9 +202,8 @@ def check_scores(entry: Entry) -> None:
 def scores_of(entry: Entry, run: RunFolder) -> list[Row]:
     """Return the rows of an entry, of simulation and skinning, without what the machine adds to them.
 
-    Raises:
-        EntryError: a roll-out did not come to its last frame: the mean over the other scenes would be of
-            easier ones.
+    Raises EntryError where a roll-out did not come to its last frame: the mean over the other scenes would be
+    of easier ones.
     """
     from benchmarks.metrics import find_metric  # loads numpy
 
@@ -229,10 +224,7 @@ def scores_of(entry: Entry, run: RunFolder) -> list[Row]:
 
 
 def write_scores(entry: Entry, run: RunFolder) -> int:
-    """Write the rows and the digests of all that was scored; return the number of rows.
-
-    The same entry gives the same bytes.
-    """
+    """Write the rows and the digests of all that was scored, the same bytes each time; return their number."""
     rows, config, folder = scores_of(entry, run), run.read_config(), entry.scores
     folder.path.mkdir(exist_ok=True)
     folder.write_rows(rows)

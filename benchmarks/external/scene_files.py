@@ -160,14 +160,9 @@ def facts_of(scene: BuiltScene) -> dict[str, Any]:
 def write_scene(
     folder: Path, declared: Scene, scene: BuiltScene, *, preset: str, simulation: Method | None
 ) -> None:
-    """Write a scene, as declared and as built, into a new folder.
+    """Write a scene, as declared and as built by the sizes of a preset, into a new or empty folder.
 
-    Args:
-        folder: has to be new or empty.
-        declared: the entry of the scene.
-        scene: the same scene, built.
-        preset: the name of the preset whose sizes it has.
-        simulation: the method whose trajectory is written too; None: none.
+    The trajectory of `simulation` is written too.
 
     Raises:
         ValueError: where a simulation is asked for of a scene for networks alone.

@@ -27,14 +27,14 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.metric import Measurements, metrics_of
 
 if TYPE_CHECKING:
-    from benchmarks.metric import RollOut
+    from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+    from benchmarks.metric import Faces, Floats, Positions, RollOut, Vertices
+
 FLAT = 1e-6  # spread of H times the cloth's length: less is round-off
 
 
@@ -74,7 +74,7 @@ def series_of(roll_out: RollOut) -> CurvatureSeries:
     return curvature_series(roll_out.positions, roll_out.scene.cloth.faces)
 
 
-def boundary_mask(faces: NDArray[np.int64], vertices: int) -> NDArray[np.bool_]:
+def boundary_mask(faces: Faces, vertices: int) -> NDArray[np.bool_]:
     """Return a mask (V,), True on vertices of edges with one triangle and on vertices of none.
 
     >>> import numpy as np
@@ -89,18 +89,11 @@ def boundary_mask(faces: NDArray[np.int64], vertices: int) -> NDArray[np.bool_]:
     return mask
 
 
-def mean_curvature(x: Floats, faces: NDArray[np.int64]) -> tuple[Floats, Floats]:
-    """Return the magnitude of mean curvature and the mixed Voronoi area of each vertex.
+def mean_curvature(x: Vertices, faces: Faces) -> tuple[Floats, Floats]:
+    """Return the magnitude of mean curvature (V,) [1/m] and the mixed Voronoi area (V,) [m^2] of each vertex.
 
     Values at boundary vertices are returned as computed; mask them with `boundary_mask`. A vertex of zero
     area gets curvature 0 and, as its area is 0, weighs nothing in any mean.
-
-    Args:
-        x: (V,3) [m].
-        faces: (F,3).
-
-    Returns:
-        Curvature (V,) [1/m] and area (V,) [m^2].
 
     Source:
         Meyer, Desbrun, Schröder and Barr 2003; the formula stands at the top of this module.
@@ -150,8 +143,8 @@ class CurvatureSeries:
         return CurvatureSeries(self.curvature[frames], self.area[frames])
 
 
-def curvature_series(positions: Floats, faces: NDArray[np.int64]) -> CurvatureSeries:
-    """Return curvature and areas of every frame of positions (T,V,3) [m]."""
+def curvature_series(positions: Positions, faces: Faces) -> CurvatureSeries:
+    """Return curvature and areas of every frame."""
     frames = [mean_curvature(x, faces) for x in positions]
     curvature, area = (np.array([pair[k] for pair in frames]).reshape(positions.shape[:2]) for k in (0, 1))
     area[:, boundary_mask(faces, positions.shape[1])] = 0.0

@@ -15,7 +15,6 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.metric import Measurements, metrics_of
 from reference_sim.energies.energy import Step
@@ -23,12 +22,10 @@ from reference_sim.energies.gravity import Gravity
 from reference_sim.energies.inertia import Inertia
 
 if TYPE_CHECKING:
-    from benchmarks.metric import RollOut, SceneRollOuts
+    from benchmarks.metric import Floats, Positions, RollOut, SceneRollOuts, Vertices
     from benchmarks.scene import BuiltScene
     from reference_sim.energies.energy import Energy
     from reference_sim.potential import Potential
-
-Floats = NDArray[np.float64]
 
 
 def copied_terms(scene: BuiltScene) -> list[Energy]:
@@ -45,18 +42,12 @@ def copied_terms(scene: BuiltScene) -> list[Energy]:
 
 
 def freeze_step(
-    scene: BuiltScene, potential: Potential, positions: Floats, frame: int, *, guess: Floats | None = None
-) -> Floats:
-    """Freeze the potential for the step that ended at `frame`; return its first guess (V,3) [m].
+    scene: BuiltScene, potential: Potential, positions: Positions, frame: int, guess: Vertices | None = None
+) -> Vertices:
+    """Freeze the potential of `copied_terms` for the step that ended at `frame`; return its first guess.
 
-    Any frame may be jumped to: the step before is prepared first where a term remembers it.
-
-    Args:
-        scene: of the trajectory.
-        potential: of terms made by `copied_terms`.
-        positions: (T,V,3) [m].
-        frame: 1 or later.
-        guess: (V,3) [m] where contact planes are searched; the simulator's first guess by default.
+    Any frame from 1 on may be jumped to: the step before is prepared first where a term remembers it. Contact
+    planes are searched at `guess`, by default the simulator's.
     """
     if frame > 1 and any(term.remembers for term in potential.energies):
         potential.prepare(step_to(scene, positions, frame - 1))
@@ -65,8 +56,8 @@ def freeze_step(
     return step.guess
 
 
-def step_to(scene: BuiltScene, positions: Floats, frame: int, *, guess: Floats | None = None) -> Step:
-    """Return the step from frame - 1 of positions (T,V,3) [m] to `frame`, as a solver is given it.
+def step_to(scene: BuiltScene, positions: Positions, frame: int, *, guess: Vertices | None = None) -> Step:
+    """Return the step from frame - 1 to `frame`, as a solver is given it.
 
     A frame before the first counts as equal to it: the start is a step from rest.
     """
@@ -76,8 +67,8 @@ def step_to(scene: BuiltScene, positions: Floats, frame: int, *, guess: Floats |
     return Step(previous, velocity, guess, scene.dt, scene.obstacle, frame)
 
 
-def first_guess(scene: BuiltScene, previous: Floats, velocity: Floats, frame: int) -> Floats:
-    """Return the solver's first guess of a step, (V,3) [m]: previous positions, carried along."""
+def first_guess(scene: BuiltScene, previous: Vertices, velocity: Floats, frame: int) -> Vertices:
+    """Return the solver's first guess of a step: previous positions, carried along."""
     if scene.obstacle is None:
         guess = previous + scene.dt * velocity
     else:
@@ -90,14 +81,10 @@ def first_guess(scene: BuiltScene, previous: Floats, velocity: Floats, frame: in
 FIRST_FULL_FRAME = 2
 
 
-def energy_series(scene: BuiltScene, trajectories: Sequence[Floats]) -> list[dict[str, Floats]]:
-    """Return energies of each trajectory: term -> (T,) [J], plus "total".
+def energy_series(scene: BuiltScene, trajectories: Sequence[Positions]) -> list[dict[str, Floats]]:
+    """Return energies of each trajectory: term of the scene -> (T,) [J], plus "total".
 
     Frames are the outer loop: what belongs to a frame alone, as an obstacle's search tree, is made once.
-
-    Args:
-        scene: its terms are evaluated; terms that are not declared have no entry.
-        trajectories: positions (T,V,3) [m] each.
 
     >>> from benchmarks.presets import find_preset
     >>> from benchmarks.scenes import find_scene

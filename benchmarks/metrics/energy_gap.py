@@ -30,18 +30,17 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.metric import Estimate, Measurements, metrics_of
 from benchmarks.metrics.curvature import boundary_mask, mean_curvature
 from benchmarks.metrics.energy import copied_terms, freeze_step
 
 if TYPE_CHECKING:
-    from benchmarks.metric import RollOut, SceneRollOuts
+    from numpy.typing import NDArray
+
+    from benchmarks.metric import Faces, Floats, Positions, RollOut, SceneRollOuts, Vertices
     from benchmarks.scene import BuiltScene
     from reference_sim.potential import Potential
-
-Floats = NDArray[np.float64]
 
 ITERATIONS = 300  # of one minimisation: a limit by the clock would make a gap depend on how busy a machine is
 PRECISION = 0.1  # standard error of the gap, as a share of it
@@ -130,18 +129,11 @@ class Optimality:
 
 
 def optimality(
-    scene: BuiltScene, positions: Floats, *, samples: int, scale: float | None = None
+    scene: BuiltScene, positions: Positions, *, samples: int, scale: float | None = None
 ) -> Optimality:
-    """Solve the time steps of at least `samples` frames again and compare, as the module says.
+    """Solve the time steps of at least `samples` frames again, until the gap is precise, and compare.
 
-    Args:
-        scene: its terms and its step.
-        positions: (T,V,3) [m] of a roll-out.
-        samples: number of frames; more are solved until the gap is precise.
-        scale: [J] of the scene's gaps.
-
-    Returns:
-        The numbers of each sampled frame; nan where a frame has no finite energy.
+    scale: [J] of the scene's gaps. All numbers are nan where a frame has no finite energy.
     """
     from reference_sim.minimise.descent import mean_weight
     from reference_sim.minimise.lbfgs import LBFGS  # loads numba
@@ -183,7 +175,7 @@ def optimality(
     return numbers
 
 
-def _judged(scene: BuiltScene, positions: Floats) -> range:
+def _judged(scene: BuiltScene, positions: Positions) -> range:
     """Return the frames that are evaluated; none where a frame is not one time step."""
     return range(scene.warm_up, len(positions) if scene.substeps == 1 else 0)
 
@@ -208,8 +200,8 @@ def spread_evenly(frames: range) -> Iterator[int]:
             yield frames[turned]
 
 
-def _curvature_error(x: Floats, y: Floats, faces: NDArray[np.int64], inner: NDArray[np.bool_]) -> float:
-    """Return the mean of |H(x) - H(y)| [1/m] over inner vertices, by the areas of y (V,3) [m]."""
+def _curvature_error(x: Vertices, y: Vertices, faces: Faces, inner: NDArray[np.bool_]) -> float:
+    """Return the mean of |H(x) - H(y)| [1/m] over inner vertices, by the areas of y."""
     ours, _ = mean_curvature(x, faces)
     theirs, areas = mean_curvature(y, faces)
     return float(np.average(np.abs(ours - theirs)[inner], weights=areas[inner]))

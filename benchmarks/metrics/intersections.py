@@ -13,14 +13,13 @@ from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.metric import Measurements, metrics_of
 
 if TYPE_CHECKING:
-    from benchmarks.metric import RollOut
+    from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+    from benchmarks.metric import Faces, Floats, RollOut, Vertices
 
 SAMPLED_STEPS = 12  # pairs of consecutive frames that are looked at, evenly spread
 FARTHEST = 1.0  # [m] beside the others that a vertex moves in a frame: one that is lost moves further
@@ -50,16 +49,11 @@ def measure_swept(roll_out: RollOut) -> dict[str, float]:
     return {"intersections/swept": float(np.mean(known))} if len(known) == len(counts) else {}
 
 
-def swept_crossings(before: Floats, after: Floats, faces: NDArray[np.int64]) -> int | None:
+def swept_crossings(before: Vertices, after: Vertices, faces: Faces) -> int | None:
     """Return how many pairs of primitives meet on the straight way from `before` to `after`; None if lost.
 
     A pair without a common vertex counts once. A motion of all vertices together changes nothing. A cloth is
     lost where a vertex moves by more than FARTHEST beside the others, or MOST_PAIRS are surpassed.
-
-    Args:
-        before: (V,3) [m].
-        after: (V,3) [m].
-        faces: (F,3).
     """
     import ipctk
 
@@ -84,7 +78,7 @@ def swept_crossings(before: Floats, after: Floats, faces: NDArray[np.int64]) -> 
     )
 
 
-def _meeting(test: Any, before: Floats, after: Floats, quadruples: list[tuple[int, ...]]) -> int:
+def _meeting(test: Any, before: Vertices, after: Vertices, quadruples: list[tuple[int, ...]]) -> int:
     """Return how many of the quadruples of vertices meet, by ipctk's test."""
     chosen = np.array(quadruples, dtype=np.int64).reshape(-1, 4)
     chosen = chosen[coplanar_on_the_way(before[chosen], after[chosen])]

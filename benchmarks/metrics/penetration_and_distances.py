@@ -7,15 +7,12 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.metric import Measurements, metrics_of
 
 if TYPE_CHECKING:
-    from benchmarks.metric import RollOut, SceneRollOuts
+    from benchmarks.metric import Faces, Floats, Positions, RollOut, SceneRollOuts, Vertices
     from reference_sim.obstacle import Obstacle
-
-Floats = NDArray[np.float64]
 
 MM = 1e3
 DEEP = 5e-3  # [m] below the skin: what an eye sees
@@ -69,8 +66,8 @@ def _inside(roll_outs: Sequence[RollOut]) -> dict[RollOut, Penetration]:
     return dict(zip(roll_outs, penetration(positions, faces, obstacle)))
 
 
-def rms(x: Floats, y: Floats) -> float:
-    """Return the root mean square distance [mm] between vertices of x and y (T,V,3) [m], over all frames.
+def rms(x: Positions, y: Positions) -> float:
+    """Return the root mean square distance [mm] between the same vertices of x and y, over all frames.
 
     >>> import numpy as np
     >>> rms(np.zeros((2, 4, 3)), np.full((2, 4, 3), [0.003, 0.0, 0.004]))
@@ -79,7 +76,7 @@ def rms(x: Floats, y: Floats) -> float:
     return MM * float(np.sqrt((distance_rms(x, y) ** 2).mean()))
 
 
-def distance_rms(positions: Floats, reference: Floats) -> Floats:
+def distance_rms(positions: Positions, reference: Positions) -> Floats:
     """Return the root mean square distance between the same vertices of each frame, (T,) [m].
 
     Two accurate solvers of one wrinkling step differ by centimetres, since it has several minima: read this
@@ -103,9 +100,6 @@ class SurfaceSamples:
     The seven-point rule of degree 3 for triangles: vertices, midpoints of edges and centroid have weights of
     1/20, 2/15 and 9/20 of a triangle's area, and integrals of cubic polynomials are exact.
 
-    Args:
-        faces: (F,3).
-
     >>> import numpy as np
     >>> x = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
     >>> samples = SurfaceSamples(np.array([[0, 2, 1]]))
@@ -113,17 +107,17 @@ class SurfaceSamples:
     ((7, 3), 0.05)
     """
 
-    def __init__(self, faces: NDArray[np.int64]) -> None:
+    def __init__(self, faces: Faces) -> None:
         self.faces = faces
         sides = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         self.edges, places = np.unique(sides, axis=0, return_inverse=True)
         self.edges_of_faces = places.reshape(-1, 3)
 
-    def points(self, x: Floats) -> Floats:
-        """Return vertices, midpoints of edges and centroids (V+E+F,3) [m] of positions (V,3)."""
+    def points(self, x: Vertices) -> Floats:
+        """Return vertices, midpoints of edges and centroids (V+E+F,3) [m]."""
         return np.concatenate([x, x[self.edges].mean(axis=1), x[self.faces].mean(axis=1)])
 
-    def weights(self, x: Floats) -> Floats:
+    def weights(self, x: Vertices) -> Floats:
         """Return the weight [m^2] of each of these points (V+E+F,); their sum is the area."""
         sides = x[self.faces[:, 1:]] - x[self.faces[:, :1]]
         areas = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
@@ -133,16 +127,11 @@ class SurfaceSamples:
 
 
 def penetration(
-    trajectories: Sequence[Floats], faces: Sequence[NDArray[np.int64]], obstacle: Obstacle
+    trajectories: Sequence[Positions], faces: Sequence[Faces], obstacle: Obstacle
 ) -> list[Penetration]:
     """Return how far each trajectory lies in the obstacle, by its signed distance.
 
     All trajectories are asked about together at each frame: the obstacle's search tree is made once.
-
-    Args:
-        trajectories: positions (T,V,3) [m] each.
-        faces: (F,3) each.
-        obstacle: with a signed distance, as a body.
     """
     samples = [SurfaceSamples(each) for each in faces]
     penetrations = [
@@ -163,16 +152,11 @@ def penetration(
     return penetrations
 
 
-def own_part_depth(positions: Floats, obstacle: Obstacle, rest_positions: Floats) -> Floats:
+def own_part_depth(positions: Positions, obstacle: Obstacle, rest_positions: Vertices) -> Floats:
     """Return the depth of each vertex under the part of the body that it belongs to, (T,V) [m].
 
     The true signed distance also counts cloth in the fold of a hip or between arm and chest, which no eye
     sees; this one measures against the faces near a vertex's own rest position alone.
-
-    Args:
-        positions: (T,V,3) [m].
-        obstacle: the body.
-        rest_positions: (V,3) [m] of the garment.
     """
     depth = np.empty(positions.shape[:2])
     for frame, x in enumerate(positions):

@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.metric import Measurements, metrics_of
 
 if TYPE_CHECKING:
-    from benchmarks.metric import RollOut
+    from numpy.typing import NDArray
+
+    from benchmarks.metric import Faces, RollOut, Vertices
 
 SAMPLED_FRAMES = 24  # frames that are looked at, evenly spaced
 OFFSET = 1e-3  # [m] off the skin, where a point is inside the body only if another part of it is there
@@ -55,8 +56,8 @@ def measure_body(roll_out: RollOut) -> dict[str, float]:
     }
 
 
-def inside_itself(x: NDArray[np.float64], faces: NDArray[np.int64]) -> NDArray[np.bool_]:
-    """Return which vertices x (B,3) [m] of a closed surface, faces (F,3) outward, are inside another part.
+def inside_itself(x: Vertices, faces: Faces) -> NDArray[np.bool_]:
+    """Return which vertices of a closed surface are inside another part of it.
 
     There the winding number of the surface around a point a little off the vertex, along its normal, is one.
     """

@@ -7,16 +7,20 @@ which two triangles intersect ends at two such crossings; all lines together are
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from numpy.typing import NDArray
 
 from reference_sim.kernels.kernel_cache import njit
 
-Floats = NDArray[np.float64]
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from benchmarks.metric import Faces, Vertices
 
 
-def self_intersections(x: Floats, faces: NDArray[np.int64]) -> tuple[NDArray[np.bool_], float]:
-    """Return which faces (F,3) of positions (V,3) [m] intersect another, (F,), and the contours' length [m].
+def self_intersections(x: Vertices, faces: Faces) -> tuple[NDArray[np.bool_], float]:
+    """Return which faces intersect another, (F,), and the contours' length [m].
 
     >>> import numpy as np
     >>> flat, upright = [[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[1, 1, -1], [1, 1, 1], [9, 1, 0]]

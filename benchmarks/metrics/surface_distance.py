@@ -16,17 +16,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from benchmarks.metric import Measurements, metrics_of
 from benchmarks.metrics.penetration_and_distances import MM
 from reference_sim.geometry.topology import triangle_areas
 
 if TYPE_CHECKING:
-    from benchmarks.metric import RollOut
-
-Floats = NDArray[np.float64]
-Indices = NDArray[np.int64]
+    from benchmarks.metric import Faces, Floats, RollOut, Vertices
 
 SAMPLED_FRAMES = 12  # frames that are looked at, evenly spread
 LOST = 1e6  # [m] from the origin: a vertex so far off is on no surface, and its square may overflow
@@ -50,14 +46,8 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
     return {"surface/chamfer": MM * float(distance), "surface/normals": float(np.rad2deg(angle))}
 
 
-def chamfer_and_angle(x: Floats, faces: Indices, y: Floats, others: Indices) -> tuple[float, float]:
+def chamfer_and_angle(x: Vertices, faces: Faces, y: Vertices, others: Faces) -> tuple[float, float]:
     """Return Chamfer distance [m] and mean angle of normals [rad] between two surfaces.
-
-    Args:
-        x: (V,3) [m].
-        faces: (F,3), outward.
-        y: (W,3) [m].
-        others: (G,3), outward.
 
     >>> from benchmarks.meshes import icosphere
     >>> inner, outer = icosphere(3, 1.0), icosphere(4, 1.2)
@@ -69,7 +59,7 @@ def chamfer_and_angle(x: Floats, faces: Indices, y: Floats, others: Indices) -> 
     return (forth[0] + back[0]) / 2.0, (forth[1] + back[1]) / 2.0
 
 
-def _one_way(x: Floats, faces: Indices, y: Floats, others: Indices) -> tuple[float, float]:
+def _one_way(x: Vertices, faces: Faces, y: Vertices, others: Faces) -> tuple[float, float]:
     """Return mean distance [m] and angle [rad] from the vertices x to the surface of y."""
     import igl
 
