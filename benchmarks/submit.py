@@ -224,7 +224,7 @@ def scores_of(entry: Entry, run: RunFolder) -> list[Row]:
 
 
 def write_scores(entry: Entry, run: RunFolder) -> int:
-    """Write the rows and the digests of all that was scored, the same bytes each time; return their number."""
+    """Write rows, and digests of all that was scored, the same bytes each time; return the number of rows."""
     rows, config, folder = scores_of(entry, run), run.read_config(), entry.scores
     folder.path.mkdir(exist_ok=True)
     folder.write_rows(rows)
