@@ -139,9 +139,6 @@ def faults_of(plan: Plan) -> Iterator[tuple[str, str]]:
         yield cell.scene.name if own_scene else f"{what} in {cell.scene.name}", fault
 
 
-# --- tasks that check what they run ------------------------------------------------------------------------
-
-
 def run_checked(cell: Cell, least: float, context: Context, needed: Needed) -> Outcome:
     """Run a cell, and check what a user's scene and method do.
 

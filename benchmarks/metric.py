@@ -138,10 +138,8 @@ class Measurements:
 def measurements_in(home: str) -> Measurements:
     """Return what a user's file measures."""
     module = load(home)
-    functions: dict[str, Any] = {
-        name: getattr(module, name, None) for name in ("measure", "compare", "series", "judge")
-    }
-    return Measurements(home, tuple(module.METRICS), **functions)
+    names = ("measure", "compare", "series", "judge")
+    return Measurements(home, tuple(module.METRICS), *(getattr(module, name, None) for name in names))
 
 
 @dataclass(eq=False)

@@ -21,7 +21,7 @@ from reference_sim.files.atomic_files import new_folder
 PROGRAM = "benchmarks.publish"
 WORK = Path("reports/runs/published")
 TARGET = Path("reports/published")
-KEPT = ("results.csv", "frame_energies.csv", "run.json", "report.pdf")
+KEPT = ("results.csv", "run.json", "report.pdf", "tables")
 EXAMPLES = """examples:
   python -m benchmarks.publish shapes                one of them
   python -m benchmarks.publish                       all of them
@@ -113,8 +113,8 @@ def keep(whole: Path, target: Path, shown: Sequence[str]) -> None:
 
     Raises ResultsError where a picture or film of the names in `shown` is not there.
     """
-    kept = [whole / name for name in KEPT if name != "frame_energies.csv" or (whole / name).exists()]
-    kept += [whole / "tables", *(whole / "figures" / name for name in shown)]
+    kept = [whole / name for name in KEPT] + [whole / "figures" / name for name in shown]
+    kept += [path for path in [whole / "frame_energies.csv"] if path.exists()]
     if missing := [path for path in kept if not path.exists()]:
         raise ResultsError(f"{missing[0]}: not there, and the documents show it")
     fresh = target.with_name(f"{target.name}.new")

@@ -199,15 +199,15 @@ def numbers(plan: Plan, status: int) -> dict[str, Any] | None:
     if status not in (0, 1) or not folder.rows_path.is_file():
         return None
     rows = [row for row in folder.read_rows() if row.method == name]
-    if not rows:
+    worst = next((row for row in rows if row.status != "ok"), rows[0] if rows else None)
+    if worst is None:
         return None
-    bad = next((row for row in rows if row.status != "ok"), rows[0])
     known = (row for row in rows if row.value is not None)
     return {
         "name": name,
         "scene": plan.scenes[0].name,
-        "status": bad.status,
-        "reason": bad.reason if bad.status != "ok" else "",
+        "status": worst.status,
+        "reason": worst.reason if worst.status != "ok" else "",
         "metrics": {row.metric: {"value": row.value, "unit": row.unit} for row in known},
         "folder": str(plan.folder),
     }

@@ -36,6 +36,7 @@ SHIFTING = 5e-3  # [m] rms static displacement below which there is nothing to b
 MAX_LAG = 12.0  # frames
 SHORTEST = 8  # frames of which a motion can be said
 NO_MOTION = 1e-6  # [m] rms of a dynamic part that is none
+HEM = (("amplitude", "Hem amplitude"), ("correlation", "Correlation"), ("gain", "Gain"), ("lag", "Lag"))
 
 
 def dynamic_part(moving: Array, static: Array) -> Array:
@@ -56,9 +57,8 @@ def amplitude(part: Array, reference: Array) -> float:
     >>> amplitude(np.full((2, 1, 3), 0.01), np.full((2, 1, 3), 0.02))
     0.5
     """
-    if root_mean_square(reference) < NO_MOTION:
-        return float("nan")
-    return root_mean_square(part) / root_mean_square(reference)
+    whole = root_mean_square(reference)
+    return root_mean_square(part) / whole if whole >= NO_MOTION else float("nan")
 
 
 def correlation(part: Array, reference: Array) -> float:
@@ -150,16 +150,8 @@ class HemMotion:
         still = quiet if static is None else self.of(static[:last])[judged]
         part, reference = dynamic_part(moving, still), dynamic_part(simulated, quiet)
         gain, lag = response(moving, still, self.axes[judged])
-        values = {
-            "dynamics/amplitude": amplitude(part, reference),
-            "dynamics/correlation": correlation(part, reference),
-            "dynamics/gain": gain,
-            "dynamics/lag": lag,
-        }
-        return {name: value for name, value in values.items() if np.isfinite(value)}
-
-
-COMMON = (("amplitude", "Hem amplitude"), ("correlation", "Correlation"), ("gain", "Gain"), ("lag", "Lag"))
+        values = (amplitude(part, reference), correlation(part, reference), gain, lag)
+        return {f"dynamics/{name}": v for (name, _), v in zip(HEM, values) if np.isfinite(v)}
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
@@ -233,7 +225,7 @@ DYNAMICS = Measurements(
         *((f"dynamics/common_{name}", "frames" if name == "lag" else "1", f"{title}, common",
            f"{title.lower()}, with every method's dynamic part taken from the simulator's answer to poses "
            "held still", {"table": "" if name in ("gain", "lag") else "dynamics"})
-          for name, title in COMMON),
+          for name, title in HEM),
         table="dynamics",
     ),
     measure=measure, compare=compare,

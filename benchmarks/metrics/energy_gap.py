@@ -46,9 +46,7 @@ ITERATIONS = 300  # of one minimisation: a limit by the clock would make a gap d
 PRECISION = 0.1  # standard error of the gap, as a share of it
 NEGLIGIBLE = 1e-6  # of the scale: a standard error below it is small enough however small the gap is
 MM = 1e3
-MEANS = (
-    "gap/energy", "gap/local", "gap/refrozen", "step/distance", "step/curvature", "gradient/norm",
-)  # fmt: skip
+MEANS = ("gap/energy", "gap/local", "gap/refrozen", "step/distance", "step/curvature", "gradient/norm")
 
 
 def measure(roll_out: RollOut) -> dict[str, float | Estimate]:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
 AFTER = (1, 10, 30)  # frames after the glitch
 MM = 1e3
+OF_CLOTH = ("strain", "bending", "inertia")
 LOST = 0.5  # [m] from the skinned shirt: a vertex so far off is on no body any more
 
 
@@ -73,9 +74,6 @@ def strains(cloth: Cloth, positions: np.ndarray) -> np.ndarray:
         [term.value_and_gradient(np.ascontiguousarray(x))[0] if fine else np.inf
          for x, fine in zip(positions, finite)]
     )  # fmt: skip
-
-
-OF_CLOTH = ("strain", "bending", "inertia")
 
 
 def measure_long_roll_out(roll_out: RollOut) -> dict[str, float]:
