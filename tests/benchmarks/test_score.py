@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import pickle
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,7 +21,7 @@ from benchmarks.runner.schedule import Schedule
 from reference_sim import Trajectory
 from reference_sim.trajectory import write_obj
 from tests.benchmarks.plan.planned import planned, study_with
-from tests.benchmarks.runner.tasks_by_hand import run_in_this_process, small_scene
+from tests.benchmarks.runner.tasks_by_hand import prepared, run_in_this_process, small_scene
 
 SCENE = ["--scene", "hanging_sheet", "--set", "sizes=smoke"]
 STUDY = study_with(sizes="smoke")
@@ -141,9 +140,7 @@ def test_a_run_takes_roll_outs_where_there_is_a_file_and_knows_when_it_has_chang
 
 def test_a_pickle_that_brings_its_own_body_needs_no_scene(tmp_path, without_report, capsys):
     scene = small_scene("sheet_on_sphere")
-    made = find_method("newton-4").make(models=Path(), seed=0)
-    made.prepare(scene)
-    trajectory = made.run()
+    trajectory = prepared("newton-4", scene).run()
     pickled, rest, out = tmp_path / "pred.pkl", tmp_path / "rest.obj", tmp_path / "out"
     arguments = [str(pickled), "--rest-mesh", str(rest), "--no-reference", "--set", "sizes=smoke", "-o"]
 

@@ -27,7 +27,7 @@ from reference_sim.trajectory import write_obj
 from snug.file_options import MotionFileOptions
 from snug.motion.files import read_motion
 from snug.networks.dressed_body import DressedBody
-from tests.benchmarks.runner.tasks_by_hand import assets_of, dressed_scene, small_scene
+from tests.benchmarks.runner.tasks_by_hand import assets_of, dressed_scene, prepared, small_scene
 from tests.snug.training.dressing import swaying, tube_dress
 
 
@@ -77,16 +77,9 @@ def skinned_elsewhere(folder: Path, motion: str, turn: np.ndarray) -> np.ndarray
     return np.einsum("vj,tvja->tva", given["smoothed_weights"], placed) @ turn.T
 
 
-def made_by(name: str, scene) -> Trajectory:
-    method = find_method(name).make(models=Path(), seed=0)
-    method.prepare(scene)
-    return method.run()
-
-
 def rows_beside(scene, entry) -> dict:
     """The rows of a method beside the simulation's."""
-    method = entry.make(models=Path(), seed=0)
-    method.prepare(scene)
+    method = prepared(entry, scene)
     trajectory, still = method.run(), method.quasi_static()
     group = SceneRollOuts(scene)
     group.quasi_static = expected_positions(scene)
@@ -99,7 +92,10 @@ def rows_beside(scene, entry) -> dict:
 
 def test_skinning_made_elsewhere_and_scored_gives_the_numbers_of_the_method(home, tmp_path):
     folder, scene = home
-    expected, inside = rows_beside(scene, find_method("skinning")), made_by("skinning", scene).positions
+    expected, inside = (
+        rows_beside(scene, find_method("skinning")),
+        prepared("skinning", scene).run().positions,
+    )
 
     def rows_of_file(**arrays) -> dict:
         np.savez(tmp_path / "mine.npz", **arrays)
@@ -162,7 +158,7 @@ def test_energies_and_curvature_follow_from_the_exported_files_alone(home, name)
         positions = skinned_elsewhere(folder, "motion_smpl.npz", np.eye(3))
         positions += np.random.default_rng(0).normal(0, 0.03, positions.shape)
     else:
-        positions = made_by(name, scene).positions
+        positions = prepared(name, scene).run().positions
     ours, files = energy_series(scene, [positions])[0], exported(folder)
     curvature = curvature_series(positions, scene.cloth.faces).means()
     for frame in (0, 2, 7):

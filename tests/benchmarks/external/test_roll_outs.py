@@ -32,7 +32,7 @@ from reference_sim.trajectory import (
     write_obj,
     write_point_cache,
 )
-from tests.benchmarks.runner.tasks_by_hand import grouped, small_scene, thirds
+from tests.benchmarks.runner.tasks_by_hand import grouped, prepared, small_scene, thirds
 
 SCENE = small_scene("hanging_sheet", cells=6, frames=8)
 FACES = SCENE.cloth.faces
@@ -71,17 +71,15 @@ def write(kind: str, folder: Path, positions: np.ndarray = X, faces: np.ndarray 
     return str(path)
 
 
-def prepared(path: str, **stated):
+def stored(path: str, **stated):
     """The method of the file, and its entry."""
     entry = entry_of(RollOutOption("mine", path, **stated), SCENE.name)
-    method = entry.make(models=Path(), seed=0)
-    method.prepare(SCENE)
-    return method, entry
+    return prepared(entry, SCENE), entry
 
 
 def rows(path: str, **stated) -> dict:
     """Every number that is measured of the file, in suite speed."""
-    method, entry = prepared(path, **stated)
+    method, entry = stored(path, **stated)
     group = grouped(SCENE, {})
     group.roll_outs.append(RollOut(group, entry, method.run(), suites=("speed",)))
     return measured(group.roll_outs[0])[0]
@@ -157,7 +155,7 @@ def test_a_position_that_is_not_finite_is_named_by_frame_and_vertex(tmp_path):
     exploded = X.copy()
     exploded[5, 11:, 1] = np.inf
     path = write("npz", tmp_path, exploded)
-    made = prepared(path)[0].run()
+    made = stored(path)[0].run()
     assert made.status == "diverged"
     assert made.reason == f"{path}: frame 5, vertex 11: a position is not finite"
 
@@ -185,7 +183,7 @@ def test_a_roll_out_that_explodes_is_a_result_and_one_of_another_motion_is_not(m
 
 def test_another_mesh_of_the_same_surface_is_compared_as_a_surface_alone(tmp_path):
     np.savez(tmp_path / "mine.npz", positions=100.0 * CENTRES, faces=THIRDS, quasi_static=CENTRES)
-    method, entry = prepared(str(tmp_path / "mine.npz"), units="cm", other_mesh=True)
+    method, entry = stored(str(tmp_path / "mine.npz"), units="cm", other_mesh=True)
     trajectory = method.run()
     assert method.quasi_static() is None
     for other_mesh, status in ((True, "ok"), (False, "failed")):

@@ -7,12 +7,11 @@ import dataclasses
 import pytest
 
 from benchmarks.assets import Assets
-from benchmarks.methods import find_method
 from benchmarks.presets import Dependence, find_preset
 from benchmarks.runner.measurements import measured
 from benchmarks.scenes import find_scene
 from snug.body.parametric_body import Body
-from tests.benchmarks.runner.tasks_by_hand import grouped
+from tests.benchmarks.runner.tasks_by_hand import grouped, prepared
 
 SIZES = Dependence((200,), 200, (1, 2), 4, 4)
 SCENES = ("dependence/mesh/200", "dependence/dt/60")
@@ -28,12 +27,6 @@ def assets():
 def built(name, assets):
     preset = dataclasses.replace(find_preset("smoke"), dependence=SIZES)
     return find_scene(name).at(preset).build(assets)
-
-
-def prepared(name, scene):
-    made = find_method(name).make(models=None, seed=0)
-    made.prepare(scene)
-    return made
 
 
 def test_each_mesh_and_time_step_is_measured_the_same_way(assets):

@@ -14,7 +14,6 @@ import pytest
 import torch
 from scipy.optimize import minimize
 
-from benchmarks.methods import find_method
 from benchmarks.metrics import energy
 from benchmarks.metrics import energy_gap as module
 from benchmarks.metrics.curvature import curvature_error, curvature_series
@@ -22,7 +21,7 @@ from benchmarks.metrics.energy import first_guess
 from benchmarks.metrics.energy_gap import gap_scale, optimality, spread_evenly
 from reference_sim import Potential, minimise, simulate
 from reference_sim.energies import Inertia, Step
-from tests.benchmarks.runner.tasks_by_hand import grouped, small_scene
+from tests.benchmarks.runner.tasks_by_hand import grouped, prepared, small_scene
 
 YOUNG, POISSON, THICKNESS, DENSITY, BENDING, G = 70e3, 0.485, 0.47e-3, 426.0, 3.96e-5, 9.81
 
@@ -105,11 +104,9 @@ class DenseStep:
 
 
 @pytest.mark.parametrize("name", ["newton-1", "lbfgs-5", "xpbd-40"])
-def test_gap_and_one_step_errors_are_those_of_an_independent_dense_minimisation(name, tmp_path):
+def test_gap_and_one_step_errors_are_those_of_an_independent_dense_minimisation(name):
     scene = small_scene("hanging_sheet", cells=3)
-    method = find_method(name).make(models=tmp_path, seed=0)
-    method.prepare(scene)
-    x = method.run().positions[:6]
+    x = prepared(name, scene).run().positions[:6]
     step = DenseStep(scene.cloth.rest_positions, scene.cloth.faces, list(scene.cloth.pins), scene.dt)
     gaps, distances, curvatures = [], [], []
     for frame in range(2, len(x)):

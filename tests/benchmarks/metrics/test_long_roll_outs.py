@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks.methods import find_method
 from benchmarks.metrics import roll_out as metric
 from benchmarks.presets import PRESETS
 from benchmarks.results.run_folder import model_path
@@ -16,7 +15,7 @@ from benchmarks.scenes.hard_motions import ENDS, EVERY, FRAMES, LOOP_BLEND
 from snug.motion.library import make_motion
 from snug.networks.roll_out import roll_out
 from snug.training.train_network import untrained_model
-from tests.benchmarks.runner.tasks_by_hand import assets_of, grouped
+from tests.benchmarks.runner.tasks_by_hand import assets_of, grouped, prepared
 from tests.snug.training.dressing import swaying, tube_dress
 
 SMOKE = PRESETS[0]
@@ -64,9 +63,7 @@ def test_the_long_roll_out_is_the_short_one_carried_on_and_only_some_frames_are_
     dressed, walk = tube_dress(), make_motion("walk")
     scene, model = long_scene(dressed), untrained_model("snug", dressed, [walk], seed=0)
     model.save(model_path(tmp_path, "snug", 0))
-    method = find_method("snug").make(models=tmp_path, seed=0)
-    method.prepare(scene)
-    x = method.run().positions
+    x = prepared("snug", scene, tmp_path).run().positions
     motion, early, late = hard_motions.looped(walk, SMOKE.loop_frames)
     assert set(scene.kept) == {*range(0, SMOKE.loop_frames, EVERY), *early, *late}
     whole = roll_out(model, dressed, motion).positions

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks.assets import Assets
+from benchmarks.method import Method, MethodEntry
 from benchmarks.methods import find_method
 from benchmarks.methods.declared_networks import TRAININGS
 from benchmarks.metric import RollOut, SceneRollOuts
@@ -102,6 +103,14 @@ def outcome_of(plan: Plan, number: int = 0, *, processes: bool = False) -> Outco
     """Run one cell to the end of its process and return its outcome."""
     one = dataclasses.replace(plan, cells=plan.cells[number : number + 1])
     return finish(one, processes=processes).outcomes["cell", plan.cells[number].name]
+
+
+def prepared(method: str | MethodEntry, scene: BuiltScene, models: Path = Path()) -> Method:
+    """The method, by its name or entry, ready to run."""
+    entry = find_method(method) if isinstance(method, str) else method
+    made = entry.make(models=models, seed=0)
+    made.prepare(scene)
+    return made
 
 
 def grouped(scene: BuiltScene, positions: dict[str, np.ndarray], **fields) -> SceneRollOuts:
