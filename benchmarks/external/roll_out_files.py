@@ -34,10 +34,10 @@ if TYPE_CHECKING:
 
 CHARACTERS = r"\w+.-"  # of a name, as a class of a regular expression
 MODULE = "benchmarks.methods.outside:make_stored"
+PLACE = "{scene}"  # in a path: the scene's name, its slashes as hyphens
 FIRST = 0.15  # of the cloth's diagonal: a first frame lies nearer than that to the scene's cloth
 FARTHEST = 0.25  # of the cloth's diagonal: its centre stays nearer than that to where the body carries it
 RATE_TOLERANCE = 1e-4  # of a frame rate: people write it with some digits
-PLACE = "{scene}"  # in a path: the scene's name, its slashes as hyphens
 
 
 class RollOutFileError(ValueError):
@@ -104,8 +104,8 @@ def parse_roll_out(text: str, *, named: bool = True) -> tuple[str, dict[str, Any
 
 OVER_TIME = ("positions", "obstacle", "quasi_static")
 FACES = {"faces": "positions", "obstacle_faces": "obstacle"}  # of which vertices
-KEYS = {name: name for name in (*OVER_TIME, *FACES, "fps")}  # of an npz, and of a pickle
-KEYS |= {"pred": "positions", "cloth_faces": "faces"}
+KEYS = {"pred": "positions", "cloth_faces": "faces"}  # of an npz, and of a pickle
+KEYS |= {name: name for name in (*OVER_TIME, *FACES, "fps")}
 
 
 @dataclass(frozen=True, eq=False)
