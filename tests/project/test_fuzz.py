@@ -5,12 +5,10 @@ READERS is the table; a new reader is one line in it. `pytest -m slow` mutates a
 
 from __future__ import annotations
 
-import json
 import os
 import pickle
 import random
 import re
-import shutil
 import time
 from collections.abc import Callable
 from functools import cache
@@ -22,8 +20,6 @@ import numpy as np
 import pytest
 
 from benchmarks.external.roll_out_files import RollOutFileError, read_roll_out
-from benchmarks.results.row import ResultsError
-from benchmarks.results.run_folder import RunFolder
 from benchmarks.timing import peak_memory
 from reference_sim import Trajectory, TrajectoryError
 from reference_sim.cloth import Cloth, MeshError
@@ -42,7 +38,6 @@ from snug.motion.motion import MotionError
 from snug.networks.garment_network import make_network
 from snug.networks.trained_model import ModelFileError, TrainedModel
 from snug.recipe import DEFAULT
-from tests.reports.report_folder import all_rows, declaration
 from tests.snug.body.other_bodies import smpl_arrays
 from tests.snug.motion.cmu_clips import amc_frame, cmu_like
 from tests.snug.motion.motion_forms import bvh
@@ -107,15 +102,6 @@ def write_shirt(path: Path) -> None:
     write_obj(path, made.rest_positions, made.faces)
 
 
-def write_run(path: Path) -> None:
-    """Write a run beside the path, and its run.json or results.csv at the path."""
-    settings = {"preset": "smoke", "stages": [{"name": "cells", "seconds": 1.0}], "earlier": []}
-    folder = RunFolder(path.with_name("valid run"))
-    folder.write_rows(all_rows())
-    folder.write_config(declaration(all_rows(), **settings, started="2030-01-02T03:04:05+00:00"))
-    path.write_bytes((folder.path / RUN_FILES[path.suffix]).read_bytes())
-
-
 class Reader(NamedTuple):
     """Writer of a valid file, its reader, the error that may be raised."""
 
@@ -146,23 +132,6 @@ def read_asf(path: Path) -> None:
     load_motions(path.with_suffix(".amc"))
 
 
-RUN_FILES = {".csv": "results.csv", ".json": "run.json"}
-
-
-def read_run(path: Path) -> None:
-    """Read a run whose file is the one at `path`, the other intact, up to the report's tables."""
-    from reports import finished_run
-    from reports.blocks import Report
-    from reports.pdf import content
-    from reports.tables import make_tables
-
-    valid, folder = path.with_name("valid run"), RunFolder(path.with_name("run"))
-    shutil.copytree(valid, folder.path, dirs_exist_ok=True)
-    (folder.path / RUN_FILES[path.suffix]).write_bytes(path.read_bytes())
-    run = finished_run.read_run(folder)
-    json.dumps(content(Report(run, make_tables(run), {})), allow_nan=False)
-
-
 READERS: tuple[Reader, ...] = (
     Reader("arrays", ".npz", lambda path: np.savez(path, a=CORNERS, b=FACES), read_arrays, ArrayFileError),
     Reader("body", ".npz", lambda path: np.savez_compressed(path, **body()), read_body, BodyError),
@@ -184,8 +153,6 @@ READERS: tuple[Reader, ...] = (
       for suffix in (".obj", ".ply", ".off")),
     Reader("trajectory", ".vtkhdf", ROLLED_OUT.save, Trajectory.load, TrajectoryError),
     Reader("model", ".safetensors", lambda path: model().save(path), TrainedModel.load, ModelFileError),
-    Reader("results.csv", ".csv", write_run, read_run, ResultsError),
-    Reader("run.json", ".json", write_run, read_run, ResultsError),
 )  # fmt: skip
 
 
