@@ -152,18 +152,14 @@ def time_batch(cell: Cell, least: float, context: Context, needed: Needed) -> Ou
     return Outcome(result=result)
 
 
-def repeat_cell(cell: Cell, least: float, context: Context, needed: Needed) -> Outcome:
-    """Return the time of one more run of a cell."""
+def repeat_cell(longest: float, cell: Cell, least: float, context: Context, needed: Needed) -> Outcome:
+    """Return the time of one more run of a cell, whose first did not take longer than `longest` [s]."""
+    if needed[cell.task_id].result["seconds"] > longest:
+        return Outcome("skipped", "the first run took too long")
     _, reading, frames = timed(prepared_method(cell, context), least)
     if reading.complaint:
         return Outcome("failed", reading.complaint, result={"seconds": reading.seconds})
     return Outcome(result=times(cell, reading, frames))
-
-
-def too_long(longest: float, needed: Needed) -> str:
-    """Return why a cell is not run again, or empty. longest: [s] of a first run that is repeated."""
-    first = next(iter(needed.values()), Outcome())
-    return "the first run took too long" if first.result.get("seconds", 0.0) > longest else ""
 
 
 def build_scene(scene: Scene, context: Context) -> BuiltScene:

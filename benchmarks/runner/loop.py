@@ -118,8 +118,8 @@ class Runner:
     def _find(self, task: Task) -> Cached:
         """Return the outcome of a task without running it, or why it has to run."""
         needed = self._needed(task)
-        if reason := task.skip if isinstance(task.skip, str) else task.skip(needed):
-            return Cached(f"skip: {reason}", Outcome("skipped", reason), content="")
+        if task.skip:
+            return Cached(f"skip: {task.skip}", Outcome("skipped", task.skip), content="")
         for id in task.needs:
             if id not in needed:
                 outcome = self._blocked(id)

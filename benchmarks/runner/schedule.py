@@ -21,14 +21,7 @@ from benchmarks.plan.plan import Network, Plan, network_of, runs
 from benchmarks.provenance import digest, digest_of_file, find_module, software
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import digests_of
-from benchmarks.runner.cells import (
-    files_of,
-    repeat_cell,
-    run_case,
-    run_cell,
-    time_batch,
-    too_long,
-)
+from benchmarks.runner.cells import files_of, repeat_cell, run_case, run_cell, time_batch
 from benchmarks.runner.ground_truth import (
     clips_of,
     files_of_start,
@@ -38,13 +31,7 @@ from benchmarks.runner.ground_truth import (
     simulate_quasi_static,
 )
 from benchmarks.runner.measurements import measure_cell, quasi_static_id
-from benchmarks.runner.networks import (
-    LONGEST,
-    NetworkTraining,
-    pretrained_network,
-    take,
-    train,
-)
+from benchmarks.runner.networks import LONGEST, NetworkTraining, pretrained_network, take, train
 from benchmarks.runner.task import Outcome, Task
 from benchmarks.scene import Scene
 from benchmarks.scenes import find_scene, of_garment
@@ -244,13 +231,13 @@ class Schedule:
             if cell.entry.batched and runs(cell):
                 yield self._timed(cell, cell.batch_id, time_batch)
         repeated = [cell for cell in cells if "speed" in cell.suites and runs(cell)]
+        longest = self.preset.repeat_seconds
         for number in range(1, self.preset.repeats):
             turn = number * len(repeated) // self.preset.repeats
             for cell in (*repeated[turn:], *repeated[:turn]):
-                yield self._timed(
-                    cell, cell.repeat_id(number), repeat_cell,
-                    skip=partial(too_long, self.preset.repeat_seconds),
-                )  # fmt: skip
+                inputs = {"least": self._least(cell), "longest": longest}
+                run = partial(repeat_cell, longest)
+                yield self._timed(cell, cell.repeat_id(number), run, inputs=inputs)
 
     def cell(self, cell: Cell) -> Task:
         """Return the task that runs a cell: alone where it is timed."""

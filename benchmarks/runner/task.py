@@ -85,8 +85,7 @@ class Task:
         code: folders and files whose content the outcome depends on, see benchmarks.provenance.
         needs: tasks without whose success it cannot be run; their outcomes count as inputs.
         reads: tasks whose outcomes it uses where they succeeded; they count as inputs too.
-        skip: why there is nothing to do, or empty, or how to tell it from what it needs. Such a task leaves
-            no trace.
+        skip: why there is nothing to do, or empty. Such a task leaves no trace.
         files: names of the files that it may leave, removed before it is run again.
         work: how much it is, compared with others of its stage: the largest begin first.
         batch: tasks of one batch are handed out together.
@@ -107,7 +106,7 @@ class Task:
     code: tuple[str, ...] = ()
     needs: tuple[TaskId, ...] = ()
     reads: tuple[TaskId, ...] = ()
-    skip: str | Callable[[Needed], str] = ""
+    skip: str = ""
     files: tuple[str, ...] = ()
     work: float = 1.0
     batch: str = ""
