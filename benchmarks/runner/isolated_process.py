@@ -31,7 +31,6 @@ if TYPE_CHECKING:
     from benchmarks.assets import Assets
 
 COMPILING = 900.0  # [s] for what a process does before its first task: it may have to compile every kernel
-PATIENCE = 2.0  # [s] for an idle process to clean up behind itself
 # What every process loads. Nothing that a scene may do without: not torch, not what a body is asked with.
 LOADED_BY_ALL = ("h5py", "numba", "scipy.sparse.linalg", "reference_sim", "benchmarks.runner.cells")
 # What every task of a scene with a body loads: torch skins the garment.
@@ -100,10 +99,10 @@ class TaskProcess:
         except (EOFError, ConnectionError):
             self._process.join()
             code = self._process.exitcode
-            self._kill()
+            self.close()
             raise WorkerDied(*how_it_ended(code)) from None
         except BaseException:
-            self._kill()
+            self.close()
             raise
         if isinstance(answer, RunStopped):
             raise answer
@@ -116,20 +115,14 @@ class TaskProcess:
             process.start()
         self._process = process
 
-    def close(self) -> None:
-        """Let the process end by itself, for it has nothing to do; then end all that it has started."""
-        if self._process is not None:
-            self._pipe.close()
-            self._process.join(PATIENCE)
-            self._kill()
-
     def stop(self) -> None:
         """Kill it and what it has started, from another thread: a task under way has failed."""
         if (process := self._process) is not None:
             end_group(process.pid)
             process.kill()
 
-    def _kill(self) -> None:
+    def close(self) -> None:
+        """End it and what it has started."""
         if self._process is not None:
             self.stop()
             self._process.join()
