@@ -74,13 +74,7 @@ def read_inputs(
     motions: Sequence[str] = (),
     motion_options: MotionFileOptions | None = None,
 ) -> Inputs:
-    """Read a user's files.
-
-    Args:
-        body: file of SMPL's family, .npz or .pkl; None: the package's body.
-        garment: mesh made for that body, and how to take it; None: garments are tailored.
-        motions: paths of files and folders; "library" is passed over.
-        motion_options: what the files of motions do not say.
+    """Read a user's files: body, a mesh made for it, motions but for "library".
 
     Raises:
         ValueError: one line with file and remedy: BodyError, GarmentError, MotionError, or InputError for a
@@ -175,12 +169,8 @@ def open_assets(
 ) -> Assets:
     """Tailor these garments and no others to the body, and cut motions to the preset's length.
 
-    Args:
-        preset: vertices of a garment, frames of a motion, of one that trains, and of a clip.
-        motions: at their full length.
-        garments: names of templates, or that of the user's garment, which is taken as read.
-        inputs: the user's body and garment; without them the package's body.
-        training: names of the motions that train.
+    Motions are given at their full length; those named in `training` have another length. A garment is
+    that of a template, or the user's, which is taken as read.
 
     Raises:
         ValueError: a garment that cannot be tailored to this body.

@@ -18,9 +18,8 @@ from benchmarks.declarations import DeclarationError, raised_at
 from benchmarks.method import Method, MethodEntry
 from benchmarks.plan import user_files
 from benchmarks.plan.cell import Cell
-from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import add_study_options, study_of
-from benchmarks.plan.plan import Plan
+from benchmarks.plan.plan import Plan, make_plan
 from benchmarks.plan.study import Part, Study
 from benchmarks.presets import find_preset
 from benchmarks.provenance import digest

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from benchmarks.methods import find_method
-from benchmarks.plan.make_plan import plan_scene
 from benchmarks.plan.options import add_study_options, study_of
+from benchmarks.plan.plan import plan_scene
 from benchmarks.plan.study import StudyError
 from benchmarks.timing import one_thread
 from reference_sim.command_line import Parser, command

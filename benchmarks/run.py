@@ -13,9 +13,8 @@ from pathlib import Path
 
 from benchmarks.declarations import DeclarationError
 from benchmarks.external.roll_out_files import RollOutFileError
-from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import PROGRAM, make_parser, refuse_former, study_of
-from benchmarks.plan.plan import Plan
+from benchmarks.plan.plan import Plan, make_plan
 from benchmarks.runner.task import RunRefused, RunStopped
 from benchmarks.timing import one_thread
 

@@ -17,9 +17,8 @@ from typing import Any, Literal
 
 from benchmarks.external.roll_out_files import RollOutFileError, RollOutOption, parse_roll_out
 from benchmarks.plan.cell import Cell
-from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import add_study_options, study_of
-from benchmarks.plan.plan import Plan
+from benchmarks.plan.plan import Plan, make_plan
 from benchmarks.plan.study import Study, StudyError, option, read_study
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.run import carry_out

@@ -15,8 +15,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from benchmarks.external.roll_out_files import RollOutOption
-from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.plan import Plan
+from benchmarks.plan.plan import Plan, make_plan
 from benchmarks.plan.study import read_fields, read_study
 from benchmarks.presets import find_preset
 from benchmarks.provenance import digest_of_file

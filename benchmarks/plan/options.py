@@ -13,7 +13,7 @@ from typing import Any
 from benchmarks.declarations import attributes_of
 from benchmarks.external.roll_out_files import parse_roll_out
 from benchmarks.plan.choose_cells import matching, scenes_of_parts
-from benchmarks.plan.make_plan import read_files
+from benchmarks.plan.plan import read_files
 from benchmarks.plan.study import Study, StudyError, Table, option, parse_setting, read_study, study_names
 from benchmarks.presets import PRESETS
 from reference_sim.command_line import Parser

@@ -7,9 +7,8 @@ import shutil
 from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import study_of
-from benchmarks.plan.plan import Network, Plan
+from benchmarks.plan.plan import Network, Plan, make_plan
 from benchmarks.plan.study import StudyError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache

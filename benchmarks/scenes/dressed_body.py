@@ -32,6 +32,7 @@ if TYPE_CHECKING:
     from snug.body.parametric_body import Body
 
 HOLD = 0.5  # frames of stillness after the limbs have arrived, as a share of those of the approach
+DISTANCE, STIFFNESS = 1e-3, 100.0  # of self-contact: [m], two thicknesses of the cloth; [Pa]
 SHORT = 0.25  # share of a motion's frames that is left out at most
 
 
@@ -65,8 +66,6 @@ def build_dressed_body(
     energies = declared_energies(cloth)
     minimised: tuple[Energy, ...] = ()
     if scene.self_contact:
-        from benchmarks.scenes.self_contact import with_self_contact  # loads the barrier
-
         minimised = with_self_contact(energies)
     terms = minimised or energies
     warm_up = max(2, min(warm_up_frames, int(SHORT * motion.frames)))
@@ -110,6 +109,21 @@ def declared_energies(cloth: Cloth) -> tuple[Energy, ...]:
     return (StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), ContactPenalty(cloth))
 
 
+def with_self_contact(energies: tuple[Energy, ...]) -> tuple[Energy, ...]:
+    """Return the terms and the barrier of their cloth against itself, a term of the simulation alone.
+
+    Where the body leaves less room than two layers of cloth need, cloth goes into the body, never through
+    itself (see reference_sim.energies.contact_barrier).
+
+    Raises:
+        ImportError: ipctk is not installed.
+        ValueError: a triangle of the mesh is less than DISTANCE high; the message names it.
+    """
+    from reference_sim.energies.contact_barrier import ContactBarrier
+
+    return (*energies, ContactBarrier(energies[0].cloth, distance=DISTANCE, stiffness=STIFFNESS))
+
+
 def settled(cloth: Cloth, energies: tuple[Energy, ...], dressed: Dressed, frames: int) -> np.ndarray:
     """Simulate the cloth to rest on the body in the motion's first pose: positions (V,3) [m].
 
@@ -126,10 +140,12 @@ def settled(cloth: Cloth, energies: tuple[Energy, ...], dressed: Dressed, frames
     # The garment, unposed on that body, goes where the root takes a body in T-pose: a rigid motion.
     root = body.transforms(t_pose[None], translations[:1], betas)[0, 0]
     start = garment.rest_for(body, betas) @ root[:, :3].T + root[:, 3]
-    if any(term.joins_late for term in energies):
-        from benchmarks.scenes.self_contact import demand_uncrossed  # loads the barrier
-
-        demand_uncrossed(start, energies, f"garment {garment.name}")
+    for barrier in (term for term in energies if term.joins_late):
+        if place := barrier.infeasibility(start):
+            raise ValueError(
+                f"garment {garment.name}: {place} where it starts: self-contact cannot untangle it; mend the "
+                "mesh at this face, or simulate without self-contact"
+            )
     way = replace(dressed, motion=replace(motion, poses=poses, translations=translations))
     return _simulated(cloth, energies, way, start, "come to rest in the first pose")[-1]
 

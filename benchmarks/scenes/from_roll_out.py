@@ -5,8 +5,6 @@ So the pickles of HOOD and ContourCraft are judged, which name neither a motion 
 
 from __future__ import annotations
 
-import sys
-
 import numpy as np
 
 from benchmarks.external.roll_out_files import RollOutFileError, RollOutOption, read_roll_out
@@ -18,26 +16,18 @@ from reference_sim.energies.contact_penalty import ContactPenalty
 from reference_sim.energies.energy import Energy
 from reference_sim.energies.gravity import Gravity
 from reference_sim.energies.stretch_stvk import StretchStVK
-from reference_sim.files.mesh_files import METRES, UP_AXES, read_mesh, to_metres_y_up
+from reference_sim.files.mesh_files import METRES, read_mesh, to_metres_y_up
 from reference_sim.material import Material
 from reference_sim.obstacle import Obstacle
 
 FPS = 30.0  # where neither the file nor the user says another rate
 LARGEST, GARMENT = 20.0, (0.2, 4.0)  # [m] across: of any cloth; from and to, of one that is worn
-UPRIGHT = 1.5  # times its height a body that stands or sits is wide at most, with its arms out
 LONGEST_STRETCH = 3.0  # times as long as at rest, edges in the mean: their vertices are no neighbours
 MIN_FRAMES = 4  # frames: two are not judged, and a mean is of more than one
 
 
 def declared(option: RollOutOption, rest_mesh: str) -> Scene:
-    """Declare the scene of that roll-out.
-
-    A line on standard error names an obstacle that is longer than high. It is not refused: a body that lies
-    has the extents of one that stands in a file with another up axis.
-
-    Raises:
-        RollOutFileError: an unreadable file, or half a body.
-    """
+    """Declare the scene of that roll-out. Raises RollOutFileError for an unreadable file, or half a body."""
     stored = read_roll_out(option.path)
     halves = {"obstacle": stored.obstacle, "obstacle_faces": stored.obstacle_faces}
     gone = [name for name, half in halves.items() if half is None]
@@ -46,16 +36,6 @@ def declared(option: RollOutOption, rest_mesh: str) -> Scene:
             f"{option.path}: holds half a body: {gone[0]} is absent; give obstacle (T,B,3) and "
             "obstacle_faces (G,3), or neither"
         )
-    if stored.obstacle is not None:
-        extents = np.ptp(to_metres_y_up(stored.obstacle, up=option.up), axis=1).mean(axis=0)
-        height, length = extents[1], extents.max()
-        if length > UPRIGHT * height:
-            (other,) = {*UP_AXES} - {option.up}
-            print(
-                f"{option.path}: with up={option.up} the obstacle is {height:.3g} {option.units} high and "
-                f"{length:.3g} {option.units} long: if it is a body that stands, give up={other}",
-                file=sys.stderr,
-            )
     return Scene(
         name=f"file/{option.name}",
         description=f"the cloth and the body of {option.name}'s own roll-out",

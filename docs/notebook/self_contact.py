@@ -18,7 +18,7 @@ from benchmarks.assets import open_assets
 from benchmarks.methods.simulation import Simulation
 from benchmarks.presets import find_preset
 from benchmarks.scenes import of_garment
-from benchmarks.scenes.self_contact import with_self_contact
+from benchmarks.scenes.dressed_body import with_self_contact
 from benchmarks.timing import one_thread
 from snug.motion.library import make_motion
 

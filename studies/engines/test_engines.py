@@ -18,7 +18,7 @@ import engine_runs
 import newton_cloth
 from benchmarks import BuiltScene
 from benchmarks.meshes import lying, rectangle
-from benchmarks.plan.make_plan import make_plan
+from benchmarks.plan.plan import make_plan
 from benchmarks.plan.study import read_study
 from engine_runs import EngineCloth, EngineDiverged, roll_out, specimen
 from engines import ENGINES, REFERENCE

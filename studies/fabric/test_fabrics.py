@@ -15,7 +15,7 @@ import textile_tables
 from benchmarks import DeclarationError, RollOut
 from benchmarks.methods import find_method
 from benchmarks.metric import SceneRollOuts
-from benchmarks.plan.make_plan import make_plan
+from benchmarks.plan.plan import make_plan
 from benchmarks.plan.study import read_study
 from benchmarks.presets import find_preset
 from benchmarks.validation.clamped_strip import exact_elastica

@@ -7,8 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks.plan.make_plan import make_plan
-from benchmarks.plan.plan import protocol_of, protocol_of_case
+from benchmarks.plan.plan import make_plan, protocol_of, protocol_of_case
 from benchmarks.provenance import digest
 from benchmarks.results import protocol as recorded
 from benchmarks.results.protocol import DIGESTS, NUMBER, OWN

@@ -137,7 +137,7 @@ def test_what_a_task_declares_holds_all_that_it_imports(task):
         ("snug/training/train_network.py", set(TASKS)),
         ("benchmarks/metrics/curvature.py", {"metrics", "case"}),
         ("benchmarks/scenes/sheets.py", set(TASKS)),
-        ("benchmarks/plan/make_plan.py", set()),
+        ("benchmarks/plan/plan.py", set()),
         ("benchmarks/runner/schedule.py", set()),
         ("reports/build.py", set()),
     ],

@@ -9,7 +9,7 @@ import pytest
 from benchmarks import methods as methods
 from benchmarks import run
 from benchmarks.methods import METHODS
-from benchmarks.plan.make_plan import make_plan
+from benchmarks.plan.plan import make_plan
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.validation.registry import KNOWN_ANSWERS, STRESS_TESTS
 from reference_sim.files.array_file import read_arrays

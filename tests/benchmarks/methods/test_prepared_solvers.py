@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Iterator
 from types import SimpleNamespace
 
@@ -13,14 +12,10 @@ from benchmarks.method import Method
 from benchmarks.methods import find_method
 from benchmarks.methods.simulation import Simulation
 from benchmarks.methods.warm_started import WarmStarted
-from benchmarks.scene import BuiltScene
-from benchmarks.scenes.self_contact import with_self_contact
-from reference_sim import Cloth, Material, cholesky, potential, simulate
-from reference_sim.energies import BendHinge, Gravity, StretchStVK
+from reference_sim import cholesky, potential, simulate
 from reference_sim.minimise import factorised, lbfgs
 from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS
 from tests.benchmarks.runner.tasks_by_hand import small_scene
-from tests.reference_sim.meshes import grid
 
 SOLVERS = (
     "simulation", "simulation-dt/2", "simulation-refrozen", "newton-2", "lbfgs-10", "fast-lbfgs-10", "vbd-20",
@@ -85,29 +80,3 @@ def test_a_warm_started_solver_begins_its_frames_and_residuals_anew(solver, monk
     runs = [served.run().positions, served.run().positions, method().run().positions]
     assert np.array_equal(runs[0], runs[1]) and np.array_equal(runs[0], runs[2])
     assert np.abs(runs[0][1:] - scene.start).max() > 1e-3
-
-
-def pressed_together() -> BuiltScene:
-    """A scene of two sheets, the upper one thrown onto the lower one."""
-    scene = small_scene("hanging_sheet", cells=4, frames=8)
-    x, faces = grid(3, 3, width=0.06, depth=0.06)
-    above = x[:, [2, 1, 0]] * [0.8, 1, 0.9] + np.array([5e-3, 3e-3, 7e-3])
-    start = np.concatenate([x, above])
-    cloth = Cloth(start, np.concatenate([faces, faces[:, ::-1] + len(x)]), Material(), pins=[0, 3, 12, 15])
-    thrown = np.zeros_like(start)
-    thrown[len(x) :] = [0.1, -0.3, 0.05]
-    energies = (StretchStVK(cloth), BendHinge(cloth), Gravity(cloth))
-    return dataclasses.replace(
-        scene, cloth=cloth, energies=energies, minimised=with_self_contact(energies), pin_positions=None,
-        settle=lambda: np.stack([start, thrown]), exact=None,
-    )  # fmt: skip
-
-
-def test_pairs_of_a_barrier_that_the_last_run_met_are_forgotten():
-    pytest.importorskip("ipctk", reason="ipctk is not installed: no self-contact")
-    method = Simulation(options={})
-    method.prepare(pressed_together())
-    first = method.run()
-    assert first.status == "converged" and first.frame_fields["energy/barrier"][-1] > 0.0
-    assert np.array_equal(first.positions, method.run().positions)
-    assert np.array_equal(first.positions, simulated_anew(method))

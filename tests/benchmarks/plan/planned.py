@@ -5,9 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.options import make_parser, study_of
-from benchmarks.plan.plan import Plan
+from benchmarks.plan.plan import Plan, make_plan
 from benchmarks.plan.study import Study, option, read_study
 
 

@@ -8,8 +8,8 @@ import pytest
 
 from benchmarks.metrics import measured_in
 from benchmarks.plan.choose_cells import expanded, matching
-from benchmarks.plan.make_plan import make_plan
 from benchmarks.plan.motions import Motions, split_motions
+from benchmarks.plan.plan import make_plan
 from benchmarks.plan.study import StudyError, read_study
 from benchmarks.presets import find_preset
 from benchmarks.scenes import GARMENT_SCENES

@@ -15,7 +15,7 @@ from contextlib import nullcontext, suppress
 import pytest
 
 from benchmarks import run
-from benchmarks.plan.make_plan import check_machines
+from benchmarks.plan.plan import check_machines
 from benchmarks.plan.study import StudyError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import cluster as scheduler

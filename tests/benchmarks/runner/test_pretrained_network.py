@@ -11,9 +11,8 @@ import torch
 
 from benchmarks.methods import find_method
 from benchmarks.plan.cell import Cell
-from benchmarks.plan.make_plan import check_machines
 from benchmarks.plan.motions import Motions
-from benchmarks.plan.plan import Network, Plan
+from benchmarks.plan.plan import Network, Plan, check_machines
 from benchmarks.plan.study import Study, StudyError
 from benchmarks.results.row import BEFORE_FRAMES
 from benchmarks.results.run_folder import RunFolder

@@ -15,19 +15,18 @@ from tests.benchmarks.runner.tasks_by_hand import small_scene
 SHEET = small_scene("hanging_sheet", cells=4, frames=5)
 STANDING = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.2, 0.0, 0.3], [0.2, 1.7, 0.1]])  # [m], head last
 TETRAHEDRON = np.array([[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]])
-Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])  # (x, y, z) -> (x, -z, y) of a row
 
 
-def declare(folder: Path, *, rest_scale: float = 1.0, body: np.ndarray = STANDING, up: str = "y"):
+def declare(folder: Path, rest_scale: float):
     """The scene of a sheet that stays where it starts, beside a body that stands there."""
     positions = np.repeat(SHEET.start[None], SHEET.frames, axis=0)
-    obstacle = np.repeat(body[None], SHEET.frames, axis=0)
+    obstacle = np.repeat(STANDING[None], SHEET.frames, axis=0)
     np.savez(
         folder / "pred.npz", positions=positions, faces=SHEET.cloth.faces, obstacle=obstacle,
         obstacle_faces=TETRAHEDRON,
     )  # fmt: skip
     write_obj(folder / "rest.obj", rest_scale * SHEET.cloth.rest_positions, SHEET.cloth.faces)
-    option = RollOutOption("pred", str(folder / "pred.npz"), up=up)
+    option = RollOutOption("pred", str(folder / "pred.npz"))
     return declared(option, str(folder / "rest.obj"))
 
 
@@ -35,19 +34,7 @@ def declare(folder: Path, *, rest_scale: float = 1.0, body: np.ndarray = STANDIN
 def test_a_rest_mesh_in_another_unit_is_refused(rest_scale, tmp_path):
     message = r"rest\.obj: .*pred\.npz .*one unit and order of vertices"
     with pytest.raises(RollOutFileError, match=message) as refused:
-        declare(tmp_path, rest_scale=rest_scale).build()
+        declare(tmp_path, rest_scale).build()
     assert "\n" not in str(refused.value)
     for scale in (1.0, 0.5, 2.0):  # cloth may start stretched, or on a mesh that was scaled a little
-        assert declare(tmp_path, rest_scale=scale).build().frames == SHEET.frames
-
-
-def test_a_body_that_is_longer_than_high_is_remarked_with_the_other_axis(tmp_path, capsys):
-    declare(tmp_path)
-    declare(tmp_path, body=STANDING @ Z_UP, up="z")
-    arms_out = np.array([[-0.9, 1.4, 0.0], [0.9, 1.4, 0.3], [0.0, 1.7, 0.0], [0.0, 0.0, 0.0]])
-    declare(tmp_path, body=arms_out)
-    assert capsys.readouterr().err == ""
-    declare(tmp_path, body=STANDING @ Z_UP)
-    assert "pred.npz: " in (line := capsys.readouterr().err) and "give up=z" in line and line.count("\n") == 1
-    declare(tmp_path, up="z")
-    assert "up=y" in capsys.readouterr().err
+        assert declare(tmp_path, scale).build().frames == SHEET.frames

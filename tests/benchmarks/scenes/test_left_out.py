@@ -20,8 +20,8 @@ import sys
 from pathlib import Path
 from benchmarks.methods import find_method
 from benchmarks.presets import find_preset
-from benchmarks.scenes import SCENES
-scene = next(scene for scene in SCENES if scene.name == sys.argv[1]).at(find_preset("smoke")).build()
+from benchmarks.scenes import find_scene
+scene = find_scene(sys.argv[1]).at(find_preset("smoke")).build()
 for name in sys.argv[2].split(","):
     method = find_method(name).make(models=Path("."), seed=0)
     method.prepare(scene)

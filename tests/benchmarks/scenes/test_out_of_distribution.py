@@ -20,8 +20,7 @@ from benchmarks.runner.measurements import measured
 from benchmarks.runner.rows import rows_of_cell
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.runner.task import Context, Outcome
-from benchmarks.scenes import find_scene, hard_motions
-from benchmarks.scenes.variations import ORDINARY, OUT_OF_DISTRIBUTION
+from benchmarks.scenes import ORDINARY, OUT_OF_DISTRIBUTION, find_scene, hard_motions
 from reference_sim import Trajectory
 from snug.body.parametric_body import Body
 from snug.body.skeleton import JOINT, joint_positions, rotation_matrices

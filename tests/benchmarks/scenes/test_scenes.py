@@ -3,21 +3,16 @@
 from __future__ import annotations
 
 import dataclasses
-import json
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from benchmarks.assets import embedded_motions, joint_speeds, liveliest_part, open_assets, read_inputs
-from benchmarks.plan.plan import network_of
+from benchmarks.assets import embedded_motions, joint_speeds, liveliest_part, open_assets
 from benchmarks.presets import find_preset
 from benchmarks.runner.cache import dependencies
-from benchmarks.runner.schedule import Schedule
-from benchmarks.scenes import SCENES, all_scenes
-from benchmarks.scenes.sheets import exact_fall
-from benchmarks.scenes.variations import SHAPES, shapes
+from benchmarks.runner.schedule import tasks_of
+from benchmarks.scenes import SCENES, all_scenes, shapes
 from reference_sim import simulate
 from snug.body.parametric_body import Body
 from snug.motion.library import make_motion
@@ -36,15 +31,6 @@ def test_small_scenes_build_alike_twice_and_declare_their_terms(scene):
     assert first.terms[-1] == "inertia" and len(set(first.terms)) == len(first.terms)
     assert (first.obstacle is not None) == ("collision" in first.terms)
     assert first.dressed is None
-
-
-def test_unseen_shapes_are_drawn_as_a_training_draws_them_and_once():
-    mean, *others = shapes("kick")
-    drawn = np.array([scene.options["betas"] for scene in others])
-    assert drawn.shape == (SHAPES, 10) and mean.options["betas"] == ()
-    assert 2.9 < np.abs(drawn).max() <= 3.0 and abs(drawn.mean()) < 3 * 3 / 360**0.5
-    assert drawn[0, 0] == pytest.approx(0.18975, abs=1e-5)  # nobody may draw until the numbers please
-    assert [scene.options for scene in shapes("punch", "tunic")] == [s.options for s in (mean, *others)]
 
 
 def test_a_body_of_another_shape_wears_the_garment_of_the_mean_one(monkeypatch):
@@ -76,49 +62,17 @@ def test_a_body_of_another_shape_wears_the_garment_of_the_mean_one(monkeypatch):
         assert apart == pytest.approx(np.linalg.norm(wanted, axis=2).min(1), abs=1e-9)
 
 
-def test_the_exact_fall_obeys_backward_euler():
-    start, velocity, dt = np.array([[0.1, 2.0, 0.3]]), np.array([1.0, 2.0, 3.0]), 0.1
-    x = exact_fall(start, velocity, dt, 6)
-    v = np.diff(x[:, 0], axis=0) / dt
-    assert x[0] == pytest.approx(start)
-    assert np.diff(v, axis=0) == pytest.approx(np.tile([0, -9.81 * dt, 0], (4, 1)))
-    assert v[0] == pytest.approx(velocity - np.array([0, 9.81 * dt, 0]))
-
-
-@pytest.mark.parametrize(
-    ("field", "value", "says"),
-    [
-        ("dt", 33.3, "dt 33.3: give the duration of a frame in seconds, above 0 and at most 1"),
-        ("dt", 0.0, "dt 0: give the duration"),
-        ("warm_up", 1, "warm_up 1: give 2 frames or more"),
-    ],
-)
-def test_a_scene_of_no_sensible_duration_is_refused(field, value, says):
-    built = SCENES[0].at(SMOKE).build()
-    with pytest.raises(ValueError, match=f"scene {built.name}: {says}"):
-        dataclasses.replace(built, **{field: value})
-
-
 def test_an_own_body_wears_the_garment_and_makes_stale_what_was_on_another(tmp_path):
     path = write_body(tmp_path / "tall.npz", 1.1)
-    plain, tall_plan = (planned("full:garments", *more) for more in ((), ("--body", path)))
-    cell = next(cell for cell in tall_plan.cells if cell.method == "snug")
-    keys = [
-        (key_of(Schedule(plan).network(network_of(cell))), key_of(Schedule(plan).cell(cell)))
-        for plan in (plain, tall_plan)
-    ]
-    assert not set(keys[0]) & set(keys[1])
-    each = (read_inputs(body=file) for file in (None, Path(path)))
-    low, high = (open_assets(TINY, [make_motion("walk")], ["tshirt"], inputs=inputs) for inputs in each)
-    heights = [np.ptp(assets.garments["tshirt"].rest_positions[:, 1]) for assets in (low, high)]
+    plans = [planned("full:garments", "--methods", "snug", *more) for more in ((), ("--body", path))]
+    for one, other in zip(*map(tasks_of, plans)):
+        assert one.kind not in ("network", "cell") or dependencies(one) != dependencies(other), one.id
+    heights = []
+    for plan in plans:
+        assets = open_assets(TINY, [make_motion("walk")], ["tshirt"], inputs=plan.inputs)
+        heights.append(np.ptp(assets.garments["tshirt"].rest_positions[:, 1]))
+        assert dressed_scene("walk").build(assets).dressed.body is assets.body
     assert 1.05 < heights[1] / heights[0] < 1.15
-    scene = dressed_scene("walk").build(high)
-    assert scene.dressed is not None and scene.dressed.body is high.body
-
-
-def key_of(task) -> str:
-    """Equal where nothing that the task depends on has changed."""
-    return json.dumps(dependencies(task), sort_keys=True)
 
 
 def test_a_clip_is_the_liveliest_part_and_what_is_not_judged_before_it():
