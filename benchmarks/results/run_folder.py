@@ -125,29 +125,16 @@ class RunFolder:
     def read_rows(self) -> list[Row]:
         """All rows. Raises ResultsError naming file and line when the file is absent or broken."""
         try:
-            stream = self.rows_path.open(newline="", encoding="utf-8")
+            with self.rows_path.open(newline="", encoding="utf-8") as stream:
+                reader = csv.reader(stream)
+                if next(reader, ()) != list(COLUMNS):
+                    raise ResultsError(f"the columns should be {','.join(COLUMNS)}")
+                lines = filter(None, reader)  # a blank line is no row
+                return [cells_to_row(dict(zip(COLUMNS, cells, strict=True))) for cells in lines]
         except FileNotFoundError:
             raise ResultsError(f"{self.rows_path}: no such file; is this the folder of a run?") from None
-        with stream:
-            try:
-                return self._rows(stream)
-            except (UnicodeDecodeError, csv.Error) as error:  # also for a cell of 131 kB
-                raise ResultsError(f"{self.rows_path}: not readable as CSV in UTF-8 ({error})") from None
-
-    def _rows(self, stream: Iterable[str]) -> list[Row]:
-        rows = []
-        reader = csv.reader(stream)
-        names = tuple(next(reader, ()))
-        if names != tuple(COLUMNS):
-            raise ResultsError(f"{self.rows_path}: line 1: the columns should be {','.join(COLUMNS)}")
-        for cells in filter(None, reader):  # a blank line is no row
-            try:
-                if len(cells) != len(names):
-                    raise ResultsError(f"{len(names)} cells are expected")
-                rows.append(cells_to_row(dict(zip(names, cells))))
-            except ResultsError as error:
-                raise ResultsError(f"{self.rows_path}: line {reader.line_num}: {error}") from None
-        return rows
+        except (ValueError, csv.Error) as error:  # not UTF-8, a cell of 131 kB, another number of cells
+            raise ResultsError(f"{self.rows_path}: line {reader.line_num}: {error}") from None
 
 
 ROLES = ("reference", "baseline", "network")
