@@ -36,6 +36,7 @@ class Kind:
         name: as a model file and `snug.train --model` have it.
         label: its name for people.
         architecture: module in snug.networks and class of its network.
+        sizes: further arguments of that class, as the number of handles.
         recipe: options of network and training, unless others are named.
         targets: what teaches it: the `energies`, simulated `vertices`, or `bands` of their unposed offsets
             (snug.training.simulated_data).
@@ -47,6 +48,7 @@ class Kind:
     name: str
     label: str
     architecture: str
+    sizes: tuple[int, ...] = ()
     recipe: Recipe = DEFAULT
     targets: str = "energies"
     fitted: bool = False
@@ -72,8 +74,8 @@ class Kind:
 
 
 def _handles(count: int, cost: float) -> Kind:
-    name, network = f"handles-{count}", f"handles.Handles{count}"
-    return Kind(name=name, label=f"{count} handles", architecture=network, recipe=HANDLES, cost=cost)
+    return Kind(name=f"handles-{count}", label=f"{count} handles", architecture="handles.StaticHandles",
+                sizes=(count,), recipe=HANDLES, cost=cost)  # fmt: skip
 
 
 KINDS = {
@@ -94,8 +96,8 @@ KINDS = {
         _handles(20, 0.4),
         _handles(40, 0.4),
         _handles(80, 0.5),
-        Kind(name="handles-80-dynamic", label="80 handles, dynamic", architecture="handles.DynamicHandles80",
-             recipe=HANDLES, closed_form=True),
+        Kind(name="handles-80-dynamic", label="80 handles, dynamic", architecture="handles.DynamicHandles",
+             sizes=(80,), recipe=HANDLES, closed_form=True),
         Kind(name="ncs", label="Neural Cloth Simulation", architecture="ncs.TwoBranches", recipe=NCS,
              cost=2.5),
         Kind(name="ncs-static", label="Neural Cloth Simulation, static branch",

@@ -17,6 +17,7 @@ from snug.file_options import (
     parse_garment_file,
     parse_motion_files,
 )
+from snug.garments.templates import GARMENT_TEMPLATES, TSHIRT, find_template
 from snug.kinds import KINDS
 from snug.named_recipes import RECIPES
 
@@ -28,7 +29,8 @@ if TYPE_CHECKING:
 
 MODELS = [name for name, kind in KINDS.items() if not kind.fitted]
 CHECKPOINT_MINUTES = 1.0  # between two checkpoints: what a kill loses at most
-EXAMPLES = """examples:
+SIMULATED = [name for name in MODELS if not KINDS[name].physics]
+EXAMPLES = f"""examples:
   python -m snug.train                                   SNUG on the embedded motions, 1000 vertices
   python -m snug.train --garment shirt.obj,units=cm --body mine.npz    your own garment (see snug.check)
   python -m snug.train --model pbns --steps 8000         the static baseline
@@ -38,7 +40,7 @@ EXAMPLES = """examples:
   python -m snug.train --dataset motions.h5 --model supervised    learn from simulated motions
   python -m snug.train --resume                          go on where a killed run wrote its last checkpoint
 
-supervised, santesteban2019 and tailornet learn from simulated motions, which python -m benchmarks.export
+{", ".join(SIMULATED)} learn from simulated motions, which python -m benchmarks.export
 GARMENT/training-motions writes; python -m benchmarks.run makes its own. With --dataset, name the --garment,
 --vertices and --body that it was written with."""
 
@@ -50,13 +52,12 @@ def parse_options(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         description="Train a garment network on a dressed body and write it to one file.",
         epilog="\n\n".join((EXAMPLES, GARMENT_WORDS, MOTION_WORDS)),
     )
-    add = parser.add_argument
+    add, garments = parser.add_argument, ", ".join(template.name for template in GARMENT_TEMPLATES)
     add("--model", choices=MODELS, default="snug", help="network and loss (default: %(default)s)")
     add("--recipe", choices=tuple(RECIPES), help="named options (default: the model's own)")
     add("--steps", type=int, default=4000, help="updates (default: %(default)s)")
-    add("--garment", metavar="NAME|FILE", default="tshirt",
-        help="tshirt, tunic, skirt, tank_top, long_sleeves, trousers, shorts, dress, or a mesh made for the "
-        "body (default: tshirt)")  # fmt: skip
+    add("--garment", metavar="NAME|FILE", default=TSHIRT,
+        help=f"{garments}, or a mesh made for the body (default: %(default)s)")  # fmt: skip
     add("--vertices", type=int, default=1000, help="of a garment (default: %(default)s)")
     add("--body", metavar="FILE", help="your own body of SMPL's family, .npz or .pkl")
     add("--motions", metavar="PATH", help="a motion file or a folder of them (default: the embedded library)")
@@ -98,8 +99,6 @@ def check_options(options: argparse.Namespace) -> None:
 def choose_garment(options: argparse.Namespace, body: Body) -> Garment:
     """Return the garment to train for, tailored or read. Raises ValueError."""
     if not is_garment_file(options.garment):
-        from snug.garments.templates import find_template
-
         return find_template(options.garment).tailor(body, vertices=options.vertices)
     from snug.garments.reading import read_garment  # a tailored garment needs no reader of meshes
 

@@ -24,15 +24,12 @@ from reference_sim.geometry.surface import vertex_normals
 from reference_sim.trajectory import Trajectory
 from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import (
-    collect_frames,
     prepare_batch,
     prepare_frame_inputs,
     prepare_roll_out,
-    prepare_skinned_frames,
     roll_out,
 )
 from snug.networks.trained_model import TrainedModel
-from snug.recipe import DEFAULT
 from snug.training.contact_cache import Patch
 
 MARGIN = 2e-3  # [m]
@@ -146,19 +143,11 @@ class Skinning(Method):
         assert scene.dressed is not None
         self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
         self.dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
-        self.frames = prepare_skinned_frames(self.dressed, self.motion, DEFAULT.smoothing, self.betas)
-        self.faces = np.asarray(scene.cloth.faces)
+        self.frames = prepare_roll_out(None, self.dressed, self.motion, self.betas)
 
     def run(self) -> Trajectory:
         """Skin all frames."""
-        positions, seconds = collect_frames(self.frames(), np.arange(self.motion.frames))
-        return Trajectory(
-            positions=positions,
-            faces=self.faces,
-            times=np.arange(len(positions)) / self.motion.fps,
-            frame_seconds=seconds,
-            provenance={"method": "skinning"},
-        )
+        return self.frames()
 
     def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
         """Return a function of the frame that makes joint transforms."""

@@ -26,7 +26,7 @@ from benchmarks.scene import BuiltScene
 from reference_sim.kernels.kernel_cache import njit
 from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS
 from snug.networks.dressed_body import DressedBody
-from snug.networks.roll_out import prepare_frame_inputs, prepare_frames, prepare_skinned_frames
+from snug.networks.roll_out import prepare_frame_inputs, prepare_frames
 from snug.networks.trained_model import TrainedModel
 from snug.recipe import DEFAULT
 
@@ -135,8 +135,6 @@ class WarmStarted(Simulation):
         dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
         model = None if self.guess == SKINNING else TrainedModel.load(self.path)
         self.of_guess = prepare_frame_inputs(model, dressed, motion, betas, earlier=before)
-        if model is None:
-            return prepare_skinned_frames(dressed, motion, DEFAULT.smoothing, betas)
         return prepare_frames(model, dressed, motion, betas, earlier=before)
 
     def _carry(self, scene: BuiltScene) -> ResidualTransport:

@@ -76,7 +76,7 @@ def train(dressed: DressedBody, recipe, folder: Path) -> None:
 
     def keep(row: dict[str, float]) -> None:
         if row["step"] in KEPT:
-            loop._finished().save(weights_file(folder, recipe.name, int(row["step"])))
+            loop.model().save(weights_file(folder, recipe.name, int(row["step"])))
             trainer.network.train()
 
     loop = TrainingLoop(trainer, every=1000, log=keep, progress=True)

@@ -32,8 +32,8 @@ class NearestPoses(GarmentNetwork):
     feature_set = "pose"
     sequential = False
 
-    def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
-        super().__init__(inputs, vertices, output_scale=output_scale)
+    def __init__(self, inputs: int, vertices: int) -> None:
+        super().__init__(inputs, vertices)
         self._keep(torch.zeros(NEIGHBOURS, inputs), torch.zeros(NEIGHBOURS, 3 * vertices))
 
     def _keep(self, poses: Tensor, offsets: Tensor) -> None:

@@ -49,14 +49,15 @@ class GarmentNetwork(nn.Module):
     lead: ClassVar[int] = 0
     closed_form: bool = False
     pins: tuple[int, ...] = ()
+    output_scale: float = 1.0
     input_mean: Tensor
     input_std: Tensor
     offsets: nn.Linear
     gru: nn.GRU
 
-    def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
+    def __init__(self, inputs: int, vertices: int) -> None:
         super().__init__()
-        self.vertices, self.output_scale = vertices, output_scale
+        self.vertices = vertices
         self.register_buffer("input_mean", torch.zeros(inputs))
         self.register_buffer("input_std", torch.ones(inputs))
 
@@ -198,10 +199,11 @@ def make_network(
         >>> tuple(offsets.shape), state
         ((2, 3, 4, 3), None)
     """
-    architecture = find_kind(kind).network
+    how = find_kind(kind)
     with seeded(seed):
-        network = architecture(inputs, vertices, output_scale=recipe.output_scale)
+        network = how.network(inputs, vertices, *how.sizes)
         initialise(network, recipe.initialisation)
+    network.output_scale = recipe.output_scale
     if recipe.zero_last_layer:
         for layer in network.last_layers():  # training then starts at the skinned garment
             for parameter in layer.parameters():

@@ -16,8 +16,6 @@ energy above the minimum (docs/notebook/training.md).
 
 from __future__ import annotations
 
-from typing import ClassVar
-
 import numpy as np
 import torch
 from torch import Tensor, nn
@@ -91,16 +89,15 @@ class HandleNetwork(GarmentNetwork):
     """Base of the networks whose output moves `handles` handles.
 
     Attributes:
+        handles: their number.
         functions: (V, handles, 4), of `shape_functions`; not trained, and zero until `wear`.
         numbers: last layer, from the activations of a subclass to twelve numbers a handle.
     """
 
-    handles: ClassVar[int]
-
-    def _add_handles(self) -> None:
+    def _add_handles(self, handles: int) -> None:
         """Add last layer and shape functions. What a seed draws depends on which layers are added before."""
-        self.numbers = nn.Linear(WIDTHS[-1], 12 * self.handles)
-        self.functions = nn.Parameter(torch.zeros(self.vertices, self.handles, 4), requires_grad=False)
+        self.handles, self.numbers = handles, nn.Linear(WIDTHS[-1], 12 * handles)
+        self.functions = nn.Parameter(torch.zeros(self.vertices, handles, 4), requires_grad=False)
 
     def wear(self, garment: Garment) -> None:
         """Place the handles on the garment. Raises ValueError where it cannot have as many."""
@@ -128,10 +125,10 @@ class StaticHandles(HandleNetwork):
     feature_set = "pose"
     sequential = False
 
-    def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
-        super().__init__(inputs, vertices, output_scale=output_scale)
+    def __init__(self, inputs: int, vertices: int, handles: int) -> None:
+        super().__init__(inputs, vertices)
         self.activations = perceptron(inputs, *WIDTHS, activation=nn.SiLU)
-        self._add_handles()
+        self._add_handles(handles)
 
     def forward(self, features: Tensor, state: None = None) -> tuple[Tensor, None]:
         """Return offsets (N, T, V, 3) [m] and no state."""
@@ -143,16 +140,15 @@ class StaticHandles(HandleNetwork):
         plan.add_handles(self.functions, plan.add_linear(self.numbers, x))
 
 
-class DynamicHandles80(HandleNetwork):
-    """Eighty handles by recurrent units of the motion, two layers of SNUG's four; the state is theirs."""
+class DynamicHandles(HandleNetwork):
+    """Recurrent units of the motion, two layers of SNUG's four; the state is theirs."""
 
-    handles = 80
     feature_set = "motion"
     sequential = True
 
-    def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
-        super().__init__(inputs, vertices, output_scale=output_scale)
-        self._add_handles()
+    def __init__(self, inputs: int, vertices: int, handles: int) -> None:
+        super().__init__(inputs, vertices)
+        self._add_handles(handles)
         self.gru = nn.GRU(inputs, WIDTHS[-1], len(WIDTHS), batch_first=True)
 
     def forward(self, features: Tensor, state: Tensor | None = None) -> tuple[Tensor, Tensor]:
@@ -164,21 +160,3 @@ class DynamicHandles80(HandleNetwork):
         """Add the operations of `forward` for one frame to the plan."""
         hidden = plan.add_gru(self.gru, x)
         plan.add_handles(self.functions, plan.add_linear(self.numbers, hidden))
-
-
-class Handles20(StaticHandles):
-    """Twenty handles."""
-
-    handles = 20
-
-
-class Handles40(StaticHandles):
-    """Forty handles."""
-
-    handles = 40
-
-
-class Handles80(StaticHandles):
-    """Eighty handles."""
-
-    handles = 80

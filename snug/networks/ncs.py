@@ -94,8 +94,8 @@ class StaticBranch(GarmentNetwork):
     feature_set = "joint_motion"
     sequential = False
 
-    def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
-        super().__init__(inputs, vertices, output_scale=output_scale)
+    def __init__(self, inputs: int, vertices: int) -> None:
+        super().__init__(inputs, vertices)
         self.static_encoder = perceptron(POSE_NUMBERS, *STATIC_WIDTHS)
         self.decoder = perceptron(WIDTH, *[WIDTH] * DECODER_LAYERS)
         self.offsets = nn.Linear(WIDTH, 3 * vertices, bias=False)
@@ -134,8 +134,8 @@ class TwoBranches(StaticBranch):
     sequential = True
     lead = LEAD
 
-    def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
-        super().__init__(inputs, vertices, output_scale=output_scale)
+    def __init__(self, inputs: int, vertices: int) -> None:
+        super().__init__(inputs, vertices)
         self.joint_encoder = perceptron(RATES, *JOINT_WIDTHS, bias=False)
         joints = len(DESCRIBED) * JOINT_WIDTHS[-1]
         self.dynamic_encoder = perceptron(joints, WIDTH, WIDTH, bias=False)

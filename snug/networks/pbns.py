@@ -24,8 +24,8 @@ class PoseSpaceDeformation(GarmentNetwork):
     activation: type[nn.Module] = nn.ReLU
     constant = False  # whether there is a deformation in every pose
 
-    def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
-        super().__init__(inputs, vertices, output_scale=output_scale)
+    def __init__(self, inputs: int, vertices: int) -> None:
+        super().__init__(inputs, vertices)
         self.activations = perceptron(inputs, *self.widths, activation=self.activation)
         # The deformation matrix, (width, V, 3) flattened.
         self.offsets = nn.Linear(self.widths[-1], 3 * vertices, bias=self.constant)

@@ -23,8 +23,8 @@ class Regressor(GarmentNetwork):
 
     hidden, layers = 256, 4
 
-    def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
-        super().__init__(inputs, vertices, output_scale=output_scale)
+    def __init__(self, inputs: int, vertices: int) -> None:
+        super().__init__(inputs, vertices)
         self.gru = nn.GRU(inputs, self.hidden, self.layers, batch_first=True)
         self.offsets = nn.Linear(self.hidden, 3 * vertices)
 

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from itertools import count
 
 import numpy as np
 import torch
@@ -22,9 +21,11 @@ from snug.networks.dressed_body import FEATURE_SETS, DressedBody
 from snug.networks.frame_layout import FramePlan, blocks_of_vertices
 from snug.networks.garment_network import GarmentNetwork
 from snug.networks.trained_model import TrainedModel, digest_of_triangles
+from snug.recipe import DEFAULT
 
 WARM_UP = 10  # frames computed and thrown away, before the caller starts a clock
 RATE_TOLERANCE = 1e-4  # of a frame rate
+SKINNING = {"method": "skinning"}  # provenance without a network
 QUASI_STATIC_FRAMES = 30  # frames for which a pose is held before its output counts as static
 
 
@@ -65,15 +66,18 @@ def roll_out(
     """
     if not quasi_static:
         return prepare_roll_out(model, dressed, motion, betas)()
-    features = _features(model, dressed, motion, betas, still=True)
-    rest, weights = dressed.rest(betas), dressed.weights(model.recipe.smoothing)
-    posed = _quasi_static(model, features, rest, weights, dressed.transforms(motion.poses, betas))
+    features, state = _features(model, dressed, motion, betas, still=True)[:, None], None
+    with torch.inference_mode():  # all frames as a batch
+        for _ in range(QUASI_STATIC_FRAMES if model.network.sequential else 1):
+            offsets, state = model.network(features, state)
+        unposed, weights = dressed.rest(betas) + offsets[:, 0], dressed.weights(model.recipe.smoothing)
+        posed = skin(unposed, weights, dressed.transforms(motion.poses, betas)).numpy()
     positions = posed.astype(np.float64) + dressed.pelvis(motion, betas)[:, None]
-    return _trajectory(model, dressed, motion, positions, np.arange(motion.frames))
+    return _trajectory(model, dressed, motion, positions, np.arange(motion.frames), np.empty(0))
 
 
 def prepare_roll_out(
-    model: TrainedModel,
+    model: TrainedModel | None,
     dressed: DressedBody,
     motion: Motion,
     betas: np.ndarray | None = None,
@@ -85,7 +89,7 @@ def prepare_roll_out(
     """Do all that comes before the first frame; return a function that gives the trajectory of `roll_out`.
 
     Args:
-        model: a trained network.
+        model: see `prepare_frames`.
         dressed: body and garment.
         motion: T frames.
         betas: shape numbers of the body.
@@ -98,12 +102,16 @@ def prepare_roll_out(
     """
     frames = prepare_frames(model, dressed, motion, betas, earlier=earlier)
     held = np.arange(motion.frames) if kept is None else kept
+    places = {int(frame): place for place, frame in enumerate(held)}
 
     def run() -> Trajectory:
-        answers = frames()
-        if postprocess is not None:
-            answers = map(postprocess, answers, count())
-        positions, seconds = collect_frames(answers, held)
+        positions, seconds = np.empty((len(held), dressed.vertices, 3)), np.empty(len(held))
+        clock = time.perf_counter()
+        for frame, x in enumerate(frames()):
+            x = x if postprocess is None else postprocess(x, frame)
+            before, clock = clock, time.perf_counter()
+            if frame in places:
+                positions[places[frame]], seconds[places[frame]] = x, clock - before
         return _trajectory(model, dressed, motion, positions, held, seconds)
 
     return run
@@ -132,37 +140,25 @@ def prepare_batch(
     return run
 
 
-def collect_frames(frames: Iterator[np.ndarray], kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Compute all frames; return positions (T, V, 3) [m] and times (T,) [s] of those numbered `kept` (T,)."""
-    places, seconds = {int(frame): place for place, frame in enumerate(kept)}, np.empty(len(kept))
-    positions, clock = np.empty(0), time.perf_counter()
-    for frame, x in enumerate(frames):
-        if not len(positions):
-            positions = np.empty((len(kept), *x.shape))
-        before, clock = clock, time.perf_counter()
-        if frame in places:
-            positions[places[frame]], seconds[places[frame]] = x, clock - before
-    return positions, seconds
-
-
 def _trajectory(
-    model: TrainedModel,
+    model: TrainedModel | None,
     dressed: DressedBody,
     motion: Motion,
     positions: np.ndarray,
     held: np.ndarray,
-    seconds: np.ndarray | None = None,
+    seconds: np.ndarray,
 ) -> Trajectory:
     """Return the trajectory of world positions (T, V, 3) [m] of the frames `held` of the motion."""
     finite = bool(np.isfinite(positions).all())
+    method = dict(method=model.kind, recipe=model.recipe.name, seed=model.seed) if model else SKINNING
     return Trajectory(
         positions=positions,
         faces=np.asarray(dressed.garment.faces),
         times=held / motion.fps,
-        frame_seconds=np.empty(0) if seconds is None else seconds,
+        frame_seconds=seconds,
         status="ok" if finite else "diverged",
         reason="" if finite else "the network gave a position that is not finite",
-        provenance=dict(method=model.kind, recipe=model.recipe.name, seed=model.seed, motion=motion.name),
+        provenance=method | dict(motion=motion.name),
     )
 
 
@@ -215,7 +211,7 @@ class CompiledFrame:
 
 
 def prepare_frames(
-    model: TrainedModel,
+    model: TrainedModel | None,
     dressed: DressedBody,
     motion: Motion,
     betas: np.ndarray | None = None,
@@ -227,7 +223,7 @@ def prepare_frames(
     Inputs and joint transforms are made, and the network warmed up, before this returns.
 
     Args:
-        model: a trained network.
+        model: a trained network; None skins alone, by the weights of the default recipe.
         dressed: body and garment.
         motion: T frames.
         betas: shape numbers of the body.
@@ -237,18 +233,28 @@ def prepare_frames(
     Raises:
         RollOutError: if the model does not fit.
     """
-    features = _features(model, dressed, earlier.followed_by(motion) if earlier else motion, betas).numpy()
-    frame = CompiledFrame(dressed.rest(betas), dressed.weights(model.recipe.smoothing), model.network)
-    return _one_by_one(frame, features, dressed, motion, betas)
+    features, network, recipe = np.empty((motion.frames, 0), np.float32), None, DEFAULT
+    if model is not None:
+        network, recipe = model.network, model.recipe
+        whole = earlier.followed_by(motion) if earlier else motion
+        features = _features(model, dressed, whole, betas).numpy()
+    frame = CompiledFrame(dressed.rest(betas), dressed.weights(recipe.smoothing), network)
+    transforms, pelvis = dressed.transforms(motion.poses, betas).numpy(), dressed.pelvis(motion, betas)
+    past, features = features[: -motion.frames], features[-motion.frames :]
+    start, out = frame.start(), np.empty((dressed.vertices, 3))
+    for before in past:
+        frame(before, transforms[0], pelvis[0], start, out)
 
+    def frames() -> Iterator[np.ndarray]:
+        work = start.copy()
+        for now in zip(features, transforms, pelvis):
+            out = np.empty((dressed.vertices, 3))
+            frame(*now, work, out)
+            yield out
 
-def prepare_skinned_frames(
-    dressed: DressedBody, motion: Motion, smoothing: int, betas: np.ndarray | None = None
-) -> Callable[[], Iterator[np.ndarray]]:
-    """Prepare frames as `prepare_frames`, of skinning alone, with weights smoothed by that many sweeps."""
-    nothing = np.empty((motion.frames, 0), np.float32)
-    frame = CompiledFrame(dressed.rest(betas), dressed.weights(smoothing))
-    return _one_by_one(frame, nothing, dressed, motion, betas)
+    for _ in zip(range(WARM_UP), frames()):
+        pass
+    return frames
 
 
 def prepare_frame_inputs(
@@ -262,8 +268,7 @@ def prepare_frame_inputs(
     """Return a function that makes one frame's inputs from its pose and those before, as an application does.
 
     It gives features (D,), or None without a model, joint transforms (24, 3, 4) and pelvis (3,) [m]: the same
-    numbers that `prepare_frames` and `prepare_skinned_frames` make for all frames at once. Raises
-    RollOutError.
+    numbers that `prepare_frames` makes for all frames at once. Raises RollOutError.
     """
     whole = earlier.followed_by(motion) if earlier else motion
     first = whole.frames - motion.frames
@@ -314,40 +319,3 @@ def _features(
             f"the model reads {inputs} numbers a frame, this body and motion give {features.shape[1]}"
         )
     return features
-
-
-def _one_by_one(
-    frame: CompiledFrame,
-    features: np.ndarray,
-    dressed: DressedBody,
-    motion: Motion,
-    betas: np.ndarray | None,
-) -> Callable[[], Iterator[np.ndarray]]:
-    """Compile and warm up; return a function that starts the frames from the state of earlier features."""
-    transforms, pelvis = dressed.transforms(motion.poses, betas).numpy(), dressed.pelvis(motion, betas)
-    past, features = features[: -motion.frames], features[-motion.frames :]
-    start, out = frame.start(), np.empty((dressed.vertices, 3))
-    for earlier in past:
-        frame(earlier, transforms[0], pelvis[0], start, out)
-
-    def frames() -> Iterator[np.ndarray]:
-        work = start.copy()
-        for now in zip(features, transforms, pelvis):
-            out = np.empty((dressed.vertices, 3))
-            frame(*now, work, out)
-            yield out
-
-    for _ in zip(range(WARM_UP), frames()):
-        pass
-    return frames
-
-
-@torch.inference_mode()
-def _quasi_static(
-    model: TrainedModel, features: Tensor, rest: Tensor, weights: Tensor, transforms: Tensor
-) -> np.ndarray:
-    """Return the last output of all frames as a batch, each pose repeated."""
-    state = None
-    for _ in range(QUASI_STATIC_FRAMES if model.network.sequential else 1):
-        offsets, state = model.network(features[:, None], state)
-    return skin(rest + offsets[:, 0], weights, transforms).numpy()

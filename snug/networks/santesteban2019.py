@@ -30,8 +30,8 @@ class FitAndWrinkles(GarmentNetwork):
     feature_set = "pose_shape"
     sequential = True
 
-    def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
-        super().__init__(inputs, vertices, output_scale=output_scale)
+    def __init__(self, inputs: int, vertices: int) -> None:
+        super().__init__(inputs, vertices)
         self.fit = nn.Sequential(nn.Linear(SHAPES, FIT_WIDTH), nn.ReLU(), nn.Linear(FIT_WIDTH, 3 * vertices))
         self.gru = nn.GRU(inputs, WRINKLE_WIDTH, batch_first=True)
         self.offsets = nn.Linear(WRINKLE_WIDTH, 3 * vertices)

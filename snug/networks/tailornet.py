@@ -48,8 +48,8 @@ class FrequencyMixture(GarmentNetwork):
     feature_set = "pose_shape"
     sequential = False
 
-    def __init__(self, inputs: int, vertices: int, *, output_scale: float = 1.0) -> None:
-        super().__init__(inputs, vertices, output_scale=output_scale)
+    def __init__(self, inputs: int, vertices: int) -> None:
+        super().__init__(inputs, vertices)
         self.low = _Perceptron(inputs, 3 * vertices)
         self.high = _Perceptron(inputs - SHAPES, 3 * vertices)
 

@@ -65,12 +65,9 @@ def _parsed(path: Path, text: str | None) -> dict[str, Any]:
     if text is None:
         raise TensorFileError(f"{path}: no model of this project (its header has no '{HEADER}' entry)")
     try:
-        header = json.loads(text)
-    except (ValueError, RecursionError) as error:
+        return dict(json.loads(text))
+    except (ValueError, TypeError, RecursionError) as error:
         raise TensorFileError(f"{path}: broken header ({error})") from error
-    if not isinstance(header, dict):
-        raise TensorFileError(f"{path}: broken header (no JSON object)")
-    return header
 
 
 def select_tensors(tensors: Mapping[str, Tensor], name: str) -> dict[str, Tensor]:

@@ -15,7 +15,7 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from snug.training.contact_cache_torch import first_places
+from snug.training.contact_cache_torch import TensorContactCache, first_places
 from snug.training.device import CudaGraph
 from snug.training.divergence_guard import SETTLING
 from snug.training.optimisation_step import Trainer
@@ -66,9 +66,8 @@ class CapturedTrainer(Trainer):
         high = number >= SETTLING and (joules > self.recipe.spike).any()
         if high or not np.isfinite([*joules, norm]).all():
             return {}
-        name = self.namer(windows)
-        verdict = self.guard.judge(number, joules, name)
-        accepted = self.guard.accepts(number, verdict, norm, joules, name)
+        verdict = self.guard.judge(number, joules, self.namer(windows))
+        accepted = self.guard.accepts(verdict, norm)
         assert verdict == "update" and accepted
         self._following()
         after, posed = self._held["after"], self._held["posed"]
@@ -107,7 +106,9 @@ class CapturedTrainer(Trainer):
         if self.contact:
             posed = self.contact.bodies.posed(batch)
             anchors = self.contact.walked(rows.flatten(), given["first"], posed, x)
-            planes = self.contact.planes_at(anchors, rows.shape, posed)
+            assert isinstance(self.contact.cache, TensorContactCache)
+            at = self.contact.cache.planes_at(*anchors, *posed[1:])
+            planes = at[0].unflatten(0, rows.shape), at[1].unflatten(0, rows.shape)
         terms = self.loss(x, batch.ahead, planes, behind=batch.behind)
         stacked = torch.stack(list(terms.values()), 1)  # (N, terms, T)
         stacked.sum(1).mean().backward()
@@ -132,4 +133,5 @@ class CapturedTrainer(Trainer):
         for group in self.optimiser.param_groups:
             group["capturable"] = False  # else torch warns of every step in single operations
         if self.contact:
-            self.contact.place(held["rows"].flatten(), held["anchors"])
+            assert isinstance(self.contact.cache, TensorContactCache)
+            self.contact.cache.place(held["rows"].flatten(), held["anchors"])

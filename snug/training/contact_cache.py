@@ -13,6 +13,7 @@ coordinates are whole 255ths, which moves it along its face, by some 0.03 mm.
 from __future__ import annotations
 
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from reference_sim.energies import ContactPenalty
 from reference_sim.geometry.closest_point import FaceSearch
 from reference_sim.kernels.fast_kernels import TRAINING_LANES
 from reference_sim.obstacle import DEFAULT_REGION, reachable_faces
-from snug.kernels.contact import PARTS, WALK_SLACK, contact_energy, triangle_adjacency
+from snug.kernels.contact import PARTS, WALK_SLACK, byte_normals, contact_energy, triangle_adjacency
 
 EXACT = 0.015  # m: a sample farther from the skin than this is in no contact, and its anchor may be rough
 
@@ -92,25 +93,25 @@ class Patch:
         return nearest.faces, nearest.barycentric[:, 1:]
 
 
-def quantise(faces: np.ndarray, barycentric: np.ndarray, body_faces: int) -> tuple[np.ndarray, np.ndarray]:
-    """Round anchors as they are cached.
-
-    Faces (S,) take as few bytes as the body's number of faces needs; barycentric coordinates (S, 2) are
-    uint8 in 1 / PARTS, the two together never more than one.
-    """
-    parts = np.rint(PARTS * barycentric)
-    parts[:, 1] = np.minimum(parts[:, 1], PARTS - parts[:, 0])
-    return faces.astype(np.int16 if body_faces < 2**15 else np.int32), parts.astype(np.uint8)
+def quantise(barycentric: Any) -> Any:
+    """Round barycentric coordinates (..., 2), an array or a tensor, to whole PARTS, in all at most PARTS."""
+    parts = (PARTS * barycentric).round()
+    parts[..., 1] = parts[..., 1].clip(max=PARTS - parts[..., 0])
+    return parts
 
 
 class ContactCache:
     """One anchor per frame and sample."""
 
     def __init__(self, patch: Patch, frames: int) -> None:
-        anchors = patch.search(patch.sample_rest, patch.rest, exact=True)
-        self.patch, (faces, barycentric) = patch, quantise(*anchors, len(patch.faces))
-        self.faces = np.repeat(faces[None], frames, axis=0)
-        self.barycentric = np.repeat(barycentric[None], frames, axis=0)
+        faces, barycentric = patch.search(patch.sample_rest, patch.rest, exact=True)
+        kind = np.int16 if len(patch.faces) < 2**15 else np.int32
+        self.patch, self.faces = patch, np.repeat(faces[None].astype(kind), frames, axis=0)
+        self.barycentric = np.repeat(quantise(barycentric)[None].astype(np.uint8), frames, axis=0)
+
+    def normals(self, positions: np.ndarray) -> np.ndarray:
+        """Return area-weighted vertex normals (N, P, 3) of positions (N, P, 3), 127 times unit length."""
+        return byte_normals(positions, self.patch.faces)
 
     def energy(
         self,
@@ -153,8 +154,8 @@ class ContactCache:
 
         exact: no old anchor stands for being roughly right.
         """
-        anchors = self.patch.search(points, positions, self.faces[frame], exact=exact)
-        self.faces[frame], self.barycentric[frame] = quantise(*anchors, len(self.patch.faces))
+        faces, barycentric = self.patch.search(points, positions, self.faces[frame], exact=exact)
+        self.faces[frame], self.barycentric[frame] = faces, quantise(barycentric)
 
 
 @lru_cache(maxsize=16)

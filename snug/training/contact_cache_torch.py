@@ -12,7 +12,7 @@ from torch import Tensor
 
 from reference_sim.geometry.surface import faces_around
 from snug.kernels.contact import CROSSINGS, WALK_SLACK
-from snug.training.contact_cache import PARTS, ContactCache, Patch
+from snug.training.contact_cache import PARTS, ContactCache, Patch, quantise
 from snug.training.device import CudaGraph, compiled
 
 Anchors = tuple[Tensor, Tensor]  # faces (N, S) and barycentric coordinates (N, S, 2)
@@ -38,7 +38,7 @@ class TensorContactCache:
         self.adjacency = torch.as_tensor(patch.adjacency, device=device).long()  # (Q, 3)
         around = _incident(patch.faces)
         self.around = torch.as_tensor(around, device=device)  # (P, K) faces, -1 beyond the last
-        self._walked_from, self.planes_at = compiled(self._walked, device), compiled(self._planes, device)
+        self._walk, self.planes_at = compiled(self._walked, device), compiled(self._planes, device)
         self._closest = CudaGraph(self._searched_in_parts, device)
 
     def normals(self, positions: Tensor) -> Tensor:
@@ -55,13 +55,10 @@ class TensorContactCache:
         return self.faces[frames], self.barycentric[frames]
 
     def _planes(
-        self, faces: Tensor, barycentric: Tensor, row: Tensor, positions: Tensor, normals: Tensor
+        self, faces: Tensor, barycentric: Tensor, positions: Tensor, normals: Tensor
     ) -> tuple[Tensor, Tensor]:
-        """Return points and unit normals (N, S, 3) of the planes at anchors (N, S).
-
-        Patch positions and normals of the bodies are rows (N,) of (R, P, 3) tensors.
-        """
-        corners, row = self.corners[faces.long()], row[:, None, None]  # (N, S, 3)
+        """Return points and unit normals (N, S, 3) of the planes at anchors (N, S) of bodies (N, P, 3)."""
+        corners, row = self.corners[faces.long()], _rows(faces)  # (N, S, 3)
         last = barycentric / PARTS
         weights = torch.cat([1 - last.sum(-1, keepdim=True), last], -1)[..., None]
         points = (weights * positions[row, corners]).sum(-2)
@@ -69,17 +66,16 @@ class TensorContactCache:
         return points, directions / (torch.linalg.vector_norm(directions, dim=-1, keepdim=True) + 1e-30)
 
     def walked(
-        self, samples: Tensor, frames: Tensor, first: Tensor, rows: Tensor, positions: Tensor,
-        normals: Tensor, *, reach: float,
+        self, samples: Tensor, frames: Tensor, first: Tensor, positions: Tensor, normals: Tensor, *,
+        reach: float,
     ) -> Anchors:  # fmt: skip
         """Return the anchors of frames (N,), moved as snug.kernels.contact.walk_to_foot does.
 
         Those of samples (N, S, 3) less than `reach` and SLACK above their planes walk. A frame that comes
-        twice walks once, as its first garment has it. first (N,): see `first_places`; rows, positions,
-        normals: see `planes_at`.
+        twice walks once, as its first garment has it. first (N,): see `first_places`; positions, normals:
+        bodies (N, P, 3).
         """
-        moved = self._walked_from(samples, *self.held(frames), rows, positions, normals, reach)
-        faces, barycentric = moved
+        faces, barycentric = self._walk(samples, *self.held(frames), positions, normals, reach)
         return faces[first], barycentric[first]
 
     def place(self, frames: Tensor, anchors: Anchors) -> None:
@@ -87,16 +83,15 @@ class TensorContactCache:
         self.faces[frames], self.barycentric[frames] = anchors
 
     def _walked(
-        self, x: Tensor, faces: Tensor, barycentric: Tensor, row: Tensor, positions: Tensor, normals: Tensor,
-        reach: float,
-    ) -> tuple[Tensor, Tensor]:  # fmt: skip
-        """Return where anchors (N, S) of samples x (N, S, 3) rest, with bodies in the rows (N,).
+        self, x: Tensor, faces: Tensor, barycentric: Tensor, positions: Tensor, normals: Tensor, reach: float
+    ) -> Anchors:
+        """Return where anchors (N, S) of samples x (N, S, 3) rest, on bodies (N, P, 3).
 
         All of them take every turn, for a GPU that counts those near the skin waits for the count.
         """
-        points, directions = self._planes(faces, barycentric, row, positions, normals)
+        points, directions = self._planes(faces, barycentric, positions, normals)
         near = ((x - points) * directions).sum(-1) < reach + WALK_SLACK
-        row, face = row[:, None, None], faces.long()
+        row, face = _rows(faces), faces.long()
         last, moving = face, near
         for _ in range(CROSSINGS):
             a, b, c = positions[row, self.corners[face]].unbind(-2)
@@ -108,8 +103,8 @@ class TensorContactCache:
             last, face = torch.where(moving, face, last), torch.where(moving, other, face)
         a, b, c = positions[row, self.corners[face]].unbind(-2)
         v, w = closest_on_triangle(b - a, c - a, x - a)
-        walked, parts = quantise_tensors(face, torch.stack([v, w], -1), faces.dtype)
-        return torch.where(near, walked, faces), torch.where(near[..., None], parts, barycentric)
+        face, parts = face.to(faces.dtype), quantise(torch.stack([v, w], -1)).to(torch.uint8)
+        return torch.where(near, face, faces), torch.where(near[..., None], parts, barycentric)
 
     def requery(self, frame: int, points: Tensor, positions: Tensor, *, exact: bool = False) -> None:
         """Search one frame's anchors anew: points (S, 3), positions (P, 3) of that frame.
@@ -123,7 +118,7 @@ class TensorContactCache:
         parts = zip(points.split(CHUNK), self.sample_rest.split(CHUNK))
         searches = [self._searched(point, home, positions) for point, home in parts]
         faces, barycentric = (torch.cat(pieces) for pieces in zip(*searches))
-        return quantise_tensors(faces, barycentric, self.faces.dtype)
+        return faces, quantise(barycentric)
 
     def _searched(self, points: Tensor, home: Tensor, positions: Tensor) -> tuple[Tensor, Tensor]:
         distances = torch.cdist(points, positions)
@@ -152,11 +147,9 @@ def first_places(frames: np.ndarray) -> np.ndarray:
     return first[again]
 
 
-def quantise_tensors(faces: Tensor, barycentric: Tensor, kind: torch.dtype) -> tuple[Tensor, Tensor]:
-    """Round anchors as snug.training.contact_cache.quantise does: faces (..., S), barycentric (..., S, 2)."""
-    second = (PARTS * barycentric[..., :1]).round()
-    third = torch.minimum((PARTS * barycentric[..., 1:]).round(), PARTS - second)
-    return faces.to(kind), torch.cat([second, third], -1).to(torch.uint8)
+def _rows(faces: Tensor) -> Tensor:
+    """Return the numbers (N, 1, 1) of the bodies that anchors (N, S) lie on."""
+    return torch.arange(len(faces), device=faces.device)[:, None, None]
 
 
 def foot(s: Tensor, t: Tensor, r: Tensor) -> tuple[Tensor, Tensor, Tensor]:

@@ -9,7 +9,7 @@ claims a contact that is none, or misses a thigh that stands in the hem.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from functools import cached_property, partial
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,6 @@ from torch import Tensor
 
 from reference_sim.energies import ContactPenalty
 from snug.body.skinning import add_pose_correctives, skin
-from snug.kernels.contact import byte_normals
 from snug.kernels.skinning import FastSkin
 from snug.training.contact_cache import ContactCache, Patch
 from snug.training.contact_cache_torch import Anchors, TensorContactCache, first_places
@@ -37,17 +36,15 @@ class BodyPatches:
 
     Args:
         data: the training set.
-        patch: the part of its body.
-        normals: of positions (N, P, 3) [m], the vertex normals as the cache of anchors takes them.
-        kernels: whether arrays are posed by kernels, else tensors on the set's device by torch.
+        cache: anchors on the patch; those of a ContactCache lie on arrays that kernels pose, others on
+            tensors that torch poses on the set's device.
         kept: whether each frame has one body for good; the kernels then pose them all once.
     """
 
-    def __init__(
-        self, data: TrainingSet, patch: Patch, normals: Callable[[Any], Any], *, kernels: bool, kept: bool
-    ) -> None:
-        body, vertices, device = data.dressed.body, patch.body_vertices, data.device
-        self.data, self.normals, self.kernels = data, normals, kernels
+    def __init__(self, data: TrainingSet, cache: ContactCache | TensorContactCache, *, kept: bool) -> None:
+        body, vertices, device = data.dressed.body, cache.patch.body_vertices, data.device
+        self.data, self.kernels = data, isinstance(cache, ContactCache)
+        self.normals: Callable[[Any], Any] = cache.normals
         self.weights, self.template, self.directions = (
             torch.as_tensor(array[vertices], dtype=torch.float32, device=device)
             for array in (body.skinning_weights, body.template, body.shape_directions)
@@ -57,7 +54,7 @@ class BodyPatches:
             correctives = body.pose_directions[vertices]
             self.correctives = torch.as_tensor(correctives, dtype=torch.float32, device=device)
         self._pose = compiled(self._posed_by_torch, device)
-        self.kept = self._posed_everywhere() if kept and kernels else None
+        self.kept = self._posed_everywhere() if kept and self.kernels else None
 
     def posed(self, batch: Batch) -> Posed:
         """Return the body in the poses of a batch."""
@@ -157,45 +154,15 @@ class TrainingContact:
         self.kernels, self.age = kernels, np.zeros(data.frames, np.int64)
         self.patch = Patch(contact.rest_samples, body.shaped(), body.faces)
         frames = data.frames
-        self.cache: ContactCache | TensorContactCache
-        normals: Callable[[Any], Any] = partial(byte_normals, faces=self.patch.faces)
-        if kernels:
-            self.cache = ContactCache(self.patch, frames)
-        else:
-            self.cache = TensorContactCache(self.patch, frames, device)
-            normals = self.cache.normals
-        self.bodies = BodyPatches(data, self.patch, normals, kernels=kernels, kept=kept)
+        self.cache = (
+            ContactCache(self.patch, frames) if kernels else TensorContactCache(self.patch, frames, device)
+        )
+        self.bodies = BodyPatches(data, self.cache, kept=kept)
         self.stencils = torch.as_tensor(contact.stencils, device=device)
         self.sample_weights = torch.as_tensor(contact.weights, dtype=torch.float32, device=device)
         self._changed = np.zeros(frames, bool)
         self._before: tuple[np.ndarray | Tensor, ...] | None = None
         self._credit = 0.0
-
-    def walked(self, frames: Tensor, first: Tensor, posed: Posed, x: Tensor) -> Anchors:
-        """Return where the anchors of a batch walk; nothing is kept, nothing waited for.
-
-        Args:
-            frames: (N T,), row numbers on the device.
-            first: (N T,), see snug.training.contact_cache_torch.first_places.
-            posed: bodies of the batch.
-            x: (N, T, V, 3), vertices that the anchors walk to.
-        """
-        assert isinstance(self.cache, TensorContactCache)
-        samples, rows = self._samples(x.detach().flatten(0, 1)), torch.arange(len(first), device=x.device)
-        return self.cache.walked(samples, frames, first, rows, *posed[1:], reach=self.contact.margin)
-
-    def planes_at(self, anchors: Anchors, shape: tuple[int, ...], posed: Posed) -> tuple[Tensor, Tensor]:
-        """Return points and normals (N, T, S, 3) at anchors of a batch of shape (N, T)."""
-        assert isinstance(self.cache, TensorContactCache)
-        rows = torch.arange(len(anchors[0]), device=self.data.device)
-        points, normals = self.cache.planes_at(*anchors, rows, *posed[1:])
-        whole = (*shape, *points.shape[1:])
-        return points.reshape(whole), normals.reshape(whole)
-
-    def place(self, frames: Tensor, anchors: Anchors) -> None:
-        """Keep anchors of frames (N,) that `walked` has found."""
-        assert isinstance(self.cache, TensorContactCache)
-        self.cache.place(frames, anchors)
 
     def planes(self, batch: Batch, posed: Posed, x: Tensor | None = None) -> Planes:
         """Return points and normals (N, T, S, 3) at the cached anchors, or, with kernels, the energy itself.
@@ -217,13 +184,24 @@ class TrainingContact:
             return lambda lanes, into: cache.energy(self.contact, lanes, into, *where, walk=walk)
         flat = batch.frames.ravel()
         frames = torch.as_tensor(flat, device=self.data.device)
-        if x is None:
-            anchors = self.cache.held(frames)
-        else:
+        if x is not None:
             first = torch.as_tensor(first_places(flat), device=self.data.device)
-            anchors = self.walked(frames, first, posed, x)
-            self.cache.place(frames, anchors)
-        return self.planes_at(anchors, batch.frames.shape, posed)
+            self.cache.place(frames, self.walked(frames, first, posed, x))
+        points, normals = self.cache.planes_at(*self.cache.held(frames), *posed[1:])
+        return points.unflatten(0, batch.frames.shape), normals.unflatten(0, batch.frames.shape)
+
+    def walked(self, frames: Tensor, first: Tensor, posed: Posed, x: Tensor) -> Anchors:
+        """Return where the anchors of a batch walk; nothing is kept, nothing waited for.
+
+        Args:
+            frames: (N T,), row numbers on the device.
+            first: (N T,), see snug.training.contact_cache_torch.first_places.
+            posed: bodies of the batch.
+            x: (N, T, V, 3), vertices that the anchors walk to.
+        """
+        assert isinstance(self.cache, TensorContactCache)
+        samples = self._samples(x.detach().flatten(0, 1))
+        return self.cache.walked(samples, frames, first, *posed[1:], reach=self.contact.margin)
 
     def search_first(self, weights: Tensor) -> None:
         """Search where the skinned template touches, in enough frames to propagate to all others.

@@ -50,6 +50,9 @@ class DivergenceGuard:
         self.bad_in_a_row = self.skipped_in_a_row = 0
         self.good_step = -1
         self._good: dict[str, Tensor] = {}
+        # Of the batch that is judged.
+        self._number, self._joules = 0, np.empty(0)
+        self._name: Callable[[int], str] = str
 
     def judge(self, number: int, joules: np.ndarray, name: Callable[[int], str]) -> str:
         """Return the verdict on a batch, before its update.
@@ -66,27 +69,26 @@ class DivergenceGuard:
         Raises:
             TrainingError: after GIVE_UP updates left out in a row.
         """
+        self._number, self._joules, self._name = number, joules, name
         bad = ~np.isfinite(joules)
         if bad.any():
-            self._leave_out(number, bad, joules, name, "update left out")
+            self._leave_out(bad, "update left out")
             return "leave out"
         spike = math.inf if self.spike is None or number < SETTLING else self.spike
         mean = float(joules.mean(dtype=np.float64))
         peaks = joules > spike
         runaway = self.usual is not None and mean > max(spike, RUNAWAY * abs(self.usual))
         if runaway:
-            if self._count_bad(number, joules, name):
+            if self._count_bad():
                 return "leave out"
         else:
             self.usual = mean if self.usual is None else MEMORY * self.usual + (1 - MEMORY) * mean
         if peaks.any():
-            self._remark(number, peaks, joules, name, "gradient clipped")
+            self._remark(peaks, "gradient clipped")
         return "distrust" if runaway else "clip" if peaks.any() else "update"
 
-    def accepts(
-        self, number: int, verdict: str, gradient_norm: float, joules: np.ndarray, name: Callable[[int], str]
-    ) -> bool:
-        """Return whether the gradient of a batch with that verdict may be followed.
+    def accepts(self, verdict: str, gradient_norm: float) -> bool:
+        """Return whether the gradient of the batch, with that verdict, may be followed.
 
         One that is not finite would ruin the weights, whatever the energies; the highest window is named.
         Raises TrainingError as `judge` does.
@@ -95,57 +97,49 @@ class DivergenceGuard:
             self.skipped_in_a_row = 0
             if verdict != "distrust":
                 self.bad_in_a_row = 0
-                if number - self.good_step >= SNAPSHOT_EVERY or not self._good:
-                    self._good, self.good_step = self._copied(), number
+                if self._number - self.good_step >= SNAPSHOT_EVERY or not self._good:
+                    live = live_tensors(self.network, self.optimiser)
+                    self._good = {name: tensor.detach().clone() for name, tensor in live}
+                    self.good_step = self._number
             return True
-        first = np.arange(len(joules)) == np.argmax(joules)
-        self._leave_out(number, first, joules, name, "gradient not finite, update left out")
+        highest = np.arange(len(self._joules)) == np.argmax(self._joules)
+        self._leave_out(highest, "gradient not finite, update left out")
         return False
 
-    def _leave_out(
-        self, number: int, which: np.ndarray, joules: np.ndarray, name: Callable[[int], str], action: str
-    ) -> None:
-        self._remark(number, which, joules, name, action)
+    def _leave_out(self, which: np.ndarray, action: str) -> None:
+        self._remark(which, action)
         self.summary["skipped_updates"] += 1
         self.skipped_in_a_row += 1
         if self.skipped_in_a_row >= GIVE_UP:
-            last = name(int(np.argmax(which)))
+            last = self._name(int(np.argmax(which)))
             raise TrainingError(f"training diverged: {GIVE_UP} updates in a row not finite, last {last}")
-        self._count_bad(number, joules, name)
+        self._count_bad()
 
-    def _count_bad(self, number: int, joules: np.ndarray, name: Callable[[int], str]) -> bool:
+    def _count_bad(self) -> bool:
         """Count one more bad batch; return whether that brought good weights back."""
         self.bad_in_a_row += 1
         if self.bad_in_a_row < PATIENCE or not self._good:
             return False
-        first = np.arange(len(joules)) == np.argmax(np.nan_to_num(joules, nan=np.inf))
-        self._remark(number, first, joules, name, f"weights of step {self.good_step} restored, rate halved")
-        self._put(self._good)
+        highest = np.arange(len(self._joules)) == np.argmax(np.nan_to_num(self._joules, nan=np.inf))
+        self._remark(highest, f"weights of step {self.good_step} restored, rate halved")
+        for name, tensor in live_tensors(self.network, self.optimiser):
+            if name in self._good:
+                tensor.detach().copy_(self._good[name])
+            else:  # a moment that the optimiser did not have yet when the copy was made
+                tensor.detach().zero_()
         if self.skipped_in_a_row <= PATIENCE:  # data that is not finite would halve it again and again
             self.rate *= 0.5
         self.summary["restored"] += 1
         self.bad_in_a_row = 0
         return True
 
-    def _remark(
-        self, number: int, which: np.ndarray, joules: np.ndarray, name: Callable[[int], str], action: str
-    ) -> None:
-        for row in np.flatnonzero(which):
+    def _remark(self, which: np.ndarray, action: str) -> None:
+        for row in np.flatnonzero(which).tolist():
             self.summary["high_windows"] += not action.startswith("weights")
             if len(self.summary["named_windows"]) < NAMED_WINDOWS:
-                window, value = name(int(row)), repr(float(joules[row]))
-                named = {"step": number, "window": window, "joules": value, "action": action}
+                window, value = self._name(row), repr(float(self._joules[row]))
+                named = {"step": self._number, "window": window, "joules": value, "action": action}
                 self.summary["named_windows"].append(named)
-
-    def _copied(self) -> dict[str, Tensor]:
-        return {name: tensor.detach().clone() for name, tensor in live_tensors(self.network, self.optimiser)}
-
-    def _put(self, tensors: dict[str, Tensor]) -> None:
-        for name, tensor in live_tensors(self.network, self.optimiser):
-            if name in tensors:
-                tensor.detach().copy_(tensors[name])
-            else:  # a moment that the optimiser did not have yet when the copy was made
-                tensor.detach().zero_()
 
     def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
         """Return everything that a resumed run needs: tensors and plain facts."""

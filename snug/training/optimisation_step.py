@@ -243,15 +243,14 @@ class Trainer:
         whole = stacked.detach()
         joules = whole.sum(1).mean(1).cpu().numpy()
         means = dict(zip(terms, whole.mean((0, 2)).tolist()))
-        name = self.namer(windows)
-        verdict = self.guard.judge(number, joules, name)
+        verdict = self.guard.judge(number, joules, self.namer(windows))
         if verdict == "leave out":
             return means, False
         self.optimiser.zero_grad(set_to_none=True)
         stacked.sum(1).mean().backward()
         parameters = [p for p in self.network.parameters() if p.grad is not None]
         norm = nn.utils.get_total_norm([p.grad for p in parameters if p.grad is not None])
-        if not self.guard.accepts(number, verdict, float(norm), joules, name):
+        if not self.guard.accepts(verdict, float(norm)):
             return means, False
         if verdict != "update":
             nn.utils.clip_grads_with_norm_(parameters, GRADIENT_LIMIT, norm)

@@ -21,7 +21,7 @@ from snug.kinds import find_kind
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
 from snug.networks.garment_network import make_network
-from snug.networks.tensor_file import TensorFileError, select_tensors
+from snug.networks.tensor_file import select_tensors
 from snug.networks.trained_model import TrainedModel, digest_of_triangles
 from snug.recipe import Recipe
 from snug.training.captured_step import CapturedTrainer
@@ -91,7 +91,7 @@ class TrainingLoop:
                 self.done += 1
                 bar.update()
                 self._between_steps(bar)
-        return self._finished()
+        return self.model()
 
     def _between_steps(self, bar: Any) -> None:
         last = self.done == self.trainer.steps
@@ -148,19 +148,15 @@ class TrainingLoop:
     def _resume(self) -> None:
         if self.checkpoint is None or (stored := self.checkpoint.read(self._identity())) is None:
             return
-        tensors, state = stored
-        try:
-            self.trainer.resume(tensors, state["trainer"])
-            device = self.trainer.device
-            self.best = {name: tensor.to(device) for name, tensor in select_tensors(tensors, "best").items()}
-            self.best_value, self.best_step, self.last_value = state["validation"]
-            self.done, self.seconds = state["done"], state["seconds"]
-            self.history, self.recent = state["history"], state["recent"]
-        except (KeyError, RuntimeError, TypeError, ValueError, AttributeError, IndexError) as error:
-            path = self.checkpoint.path
-            raise TensorFileError(f"{path}: broken checkpoint ({error}); delete it to start anew") from error
+        (tensors, state), device = stored, self.trainer.device
+        self.trainer.resume(tensors, state["trainer"])
+        self.best = {name: tensor.to(device) for name, tensor in select_tensors(tensors, "best").items()}
+        self.best_value, self.best_step, self.last_value = state["validation"]
+        self.done, self.seconds = state["done"], state["seconds"]
+        self.history, self.recent = state["history"], state["recent"]
 
-    def _finished(self) -> TrainedModel:
+    def model(self) -> TrainedModel:
+        """Return the model after the steps done so far, with the best weights if it was validated."""
         trainer = self.trainer
         summary = {**trainer.guard.summary, "epochs": trainer.epoch, "training_frames": trainer.data.frames}
         if self.validator:

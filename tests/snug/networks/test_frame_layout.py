@@ -8,7 +8,7 @@ from snug.body.skinning import skin
 from snug.kernels import one_frame as frame_kernels
 from snug.kinds import KINDS
 from snug.networks.garment_network import make_network
-from snug.networks.roll_out import CompiledFrame, prepare_frames, prepare_skinned_frames, roll_out
+from snug.networks.roll_out import CompiledFrame, prepare_frames, roll_out
 from snug.networks.trained_model import TrainedModel
 from tests.snug.training.dressing import swaying, tube_dress
 
@@ -73,7 +73,7 @@ def test_two_roll_outs_at_once_keep_their_own_states():
     alone = np.array(list(begin()))
     together = np.array(list(zip(begin(), begin())))
     assert np.array_equal(together[:, 0], alone) and np.array_equal(together[:, 1], alone)
-    assert np.abs(alone - np.array(list(prepare_skinned_frames(tube_dress(), motion, 20)()))).max() > 1e-3
+    assert np.abs(alone - np.array(list(prepare_frames(None, tube_dress(), motion)()))).max() > 1e-3
 
 
 def test_gates_are_torchs_gates_and_not_a_number_stays_so():

@@ -97,7 +97,7 @@ def test_anchors_walk_to_the_closest_skin_by_torch_and_by_kernels(region):
     assert fast.energy(*on).sum() > 0 and (fast.faces == still.faces).all()
     fast.energy(*on, walk=True)
     chosen = torch.as_tensor(frames)
-    at = torch.arange(2), torch.arange(2), positions, torch.as_tensor(normals).float()
+    at = torch.arange(2), positions, torch.as_tensor(normals).float()
     slow.place(chosen, slow.walked(samples, chosen, *at, reach=contact.margin))
     for row, frame in enumerate(frames):
         searched.requery(int(frame), samples[row].numpy(), positions[row].numpy(), exact=True)
