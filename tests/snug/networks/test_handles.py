@@ -48,12 +48,6 @@ def test_handles_move_the_garment_rigidly_and_affinely_without_error(count):
     assert count > 2 or np.abs(columns @ numbers - bent).max() > 1e-3
 
 
-@pytest.mark.parametrize("count", [0, 150])
-def test_a_number_that_the_garment_cannot_have_is_refused(count):
-    with pytest.raises(ValueError, match=f"{count} handles.*150 vertices has 1 to 149"):
-        shape_functions(tube_dress().garment, count)
-
-
 def test_a_seed_draws_the_perceptron_before_the_last_layer():
     """Layers are drawn in the order of the published trainings: another gives a seed other networks."""
     network = make_network("handles-20", 141, 150, replace(HANDLES, initialisation="torch"), seed=7)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import numpy as np
@@ -25,22 +24,6 @@ def fills(values: torch.Tensor, limit: float) -> bool:
     values = values.detach()
     spread = float(values.std()) / (limit / np.sqrt(3))
     return 0.99 * limit < float(values.abs().max()) < 1.000001 * limit and abs(spread - 1) < 0.02
-
-
-def test_a_seed_gives_the_same_weights_in_threads():
-    """Torch's generator is one for all threads: without turns each would draw from another's seed."""
-    recipe = replace(PAPER, initialisation="keras")
-
-    def weights(seed: int) -> torch.Tensor:
-        return torch.cat(
-            [p.detach().flatten() for p in make_network("snug", 85, 90, recipe, seed=seed).parameters()]
-        )
-
-    alone = [weights(seed) for seed in range(4)]
-    with ThreadPoolExecutor(4) as threads:
-        for _ in range(3):
-            beside = threads.map(weights, range(4))
-            assert all(torch.equal(one, other) for one, other in zip(alone, beside))
 
 
 def test_keras_rules_of_the_papers_network():

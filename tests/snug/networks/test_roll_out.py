@@ -23,27 +23,6 @@ from tests.snug.training.dressing import swaying, tube_dress
 SHAPED = np.array([0.0, 2.0, 0, 0, 0, 0, 0, 0, 0, 0])
 
 
-@pytest.mark.parametrize("betas", [None, SHAPED])
-def test_zero_offsets_give_skinning_alone(betas):
-    dressed, motion = tube_dress(), swaying()
-    inputs = dressed.features(motion, DEFAULT).shape[1]
-    model = TrainedModel("snug", make_network("snug", inputs, dressed.vertices, DEFAULT, seed=0), DEFAULT)
-    run = roll_out(model, dressed, motion, betas)
-    assert run.positions.dtype == np.float64
-    assert np.abs(run.positions - dressed.skinned(motion, betas, smoothing=DEFAULT.smoothing)).max() < 1e-6
-    assert run.status == "ok" and np.allclose(run.times, np.arange(motion.frames) / 30)
-
-
-def test_predictions_are_the_roll_out_a_frame_when_it_is_asked_for():
-    dressed, motion = tube_dress(), swaying()
-    model = untrained_model("snug", dressed, [motion], seed=0)
-    run = roll_out(model, dressed, motion)
-    assert run.frame_seconds.shape == (motion.frames,) and (run.frame_seconds > 0.0).all()
-    begin = prepare_frames(model, dressed, motion)
-    for _ in range(2):  # the state begins at zero again
-        assert np.array_equal(list(begin()), run.positions)
-
-
 @pytest.mark.parametrize("kind", ["snug", "pbns"])
 def test_what_came_before_a_motion_is_known_to_inputs_and_state(kind):
     dressed, motion = tube_dress(), swaying()
@@ -105,28 +84,18 @@ def test_body_shape_changes_the_roll_out_and_the_network_sees_shapes_it_has_met(
         assert least <= np.abs(offsets - plain).max() < most
 
 
-def test_misfits_are_named():
-    dressed, motion = tube_dress(), swaying()
-    with pytest.raises(RollOutError, match="7 vertices, the garment 150"):
-        roll_out(
-            TrainedModel("snug", make_network("snug", 154, 7, DEFAULT, seed=0), DEFAULT), dressed, motion
-        )
-    network = make_network("snug", 85, dressed.vertices, PAPER, seed=0)
-    with pytest.raises(RollOutError, match="reads 85 numbers"):
-        roll_out(TrainedModel("snug", network, DEFAULT), dressed, motion)
-
-
-def test_a_model_knows_the_rate_of_its_motions_and_the_triangles_of_its_garment(tmp_path):
+def test_misfits_of_vertices_numbers_triangles_and_rate_are_named():
     dressed, motion, fast = tube_dress(), swaying(), swaying(fps=60.0)
-    models = {kind: untrained_model(kind, dressed, [motion], seed=0) for kind in ("snug", "pbns")}
-    loaded = TrainedModel.load(models["snug"].save(tmp_path / "snug.safetensors"))
-    assert loaded.fps == pytest.approx(30.0) and loaded.triangles == models["pbns"].triangles != ""
-    with pytest.raises(RollOutError, match=r"learned from 30 frames a second, motion .* has 60: resample"):
-        roll_out(loaded, dressed, fast)
-    roll_out(models["pbns"], dressed, fast)  # a pose has no rate
-    for model in models.values():
-        model.triangles = "another"
-        with pytest.raises(RollOutError, match="as many vertices and other triangles"):
-            roll_out(model, dressed, motion)
-        model.triangles, model.fps = "", 0.0  # of a file of before
-        roll_out(model, dressed, fast)
+    snug, pbns = (untrained_model(kind, dressed, [motion], seed=0) for kind in ("snug", "pbns"))
+    other = TrainedModel("snug", make_network("snug", 154, 7, DEFAULT, seed=0), DEFAULT)
+    literal = replace(snug, recipe=PAPER)
+    for model, moved, message in (
+        (other, motion, "7 vertices, the garment 150"),
+        (literal, motion, "reads 154 numbers"),
+        (replace(snug, triangles="another"), motion, "as many vertices and other triangles"),
+        (snug, fast, r"learned from 30 frames a second, motion .* has 60: resample"),
+    ):
+        with pytest.raises(RollOutError, match=message):
+            roll_out(model, dressed, moved)
+    roll_out(pbns, dressed, fast)  # a pose has no rate
+    assert (roll_out(snug, dressed, motion).frame_seconds > 0.0).all()

@@ -10,7 +10,7 @@ import pytest
 from snug import trained
 from snug.networks.garment_network import make_network
 from snug.networks.tensor_file import read_header
-from snug.networks.trained_model import ModelFileError, TrainedModel
+from snug.networks.trained_model import TrainedModel
 from snug.recipe import DEFAULT
 
 PACKAGE = Path(trained.FOLDER).parents[1]
@@ -33,11 +33,6 @@ def test_a_network_is_loaded_by_its_name_with_its_origin(packaged, tmp_path, mon
     loaded = TrainedModel.load("pbns-tube")
     assert (loaded.seed, loaded.origin) == (3, packaged.origin)
     assert read_header(tmp_path / "pbns-tube.safetensors")["origin"] == packaged.origin
-
-
-def test_an_unknown_name_lists_the_names(packaged):
-    with pytest.raises(ModelFileError, match=r"^snug-tube: neither a model file .*: pbns-tube$"):
-        TrainedModel.load("snug-tube")
 
 
 def test_the_package_has_the_networks_of_the_default_run_and_stays_small():

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -11,9 +12,12 @@ from snug.garments.garment import Garment
 from snug.garments.meshing import nearest_body_vertices
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
+from snug.recipe import DEFAULT, Recipe
 from snug.training.contact_cache import PARTS
+from snug.training.optimisation_step import Trainer
 
 AROUND, RINGS = 15, 10
+PLAIN = replace(DEFAULT, mixed=0.0)
 
 
 @cache
@@ -69,3 +73,10 @@ def planes_of(anchors, frames, rows, positions, normals) -> tuple[np.ndarray, np
     every = np.asarray(rows)[:, None, None]
     points, directions = ((weights[..., None] * a[every, corners]).sum(-2) for a in (positions, normals))
     return points, directions / np.linalg.norm(directions, axis=-1, keepdims=True)
+
+
+def make_trainer(
+    recipe: Recipe = PLAIN, *, kind: str = "snug", frames: int = 30, steps: int = 400
+) -> Trainer:
+    """A trainer of the tube on one swaying motion."""
+    return Trainer(kind, tube_dress(), [swaying(frames)], steps=steps, seed=0, recipe=recipe)

@@ -8,15 +8,12 @@ import pytest
 import torch
 
 from snug.named_recipes import PAPER
-from snug.recipe import DEFAULT
 from snug.training import contact_planes
 from snug.training.captured_step import UNCAPTURED, CapturedTrainer
 from snug.training.device import CudaGraph
 from snug.training.divergence_guard import SETTLING
 from snug.training.optimisation_step import Trainer
-from tests.snug.training.dressing import swaying, tube_dress
-
-PLAIN = replace(DEFAULT, mixed=0.0)
+from tests.snug.training.dressing import PLAIN, swaying, tube_dress
 
 
 def made(recipe, kind="snug", trainer=Trainer):

@@ -18,13 +18,12 @@ from snug.training.checkpoint import Checkpoint
 from snug.training.optimisation_step import Trainer
 from snug.training.train_network import train_network
 from snug.training.validation import Validation
-from tests.snug.training.dressing import swaying, tube_dress
+from tests.snug.training.dressing import PLAIN, swaying, tube_dress
 
-PLAIN = replace(DEFAULT, mixed=0.0)
 STEPS = 7
 EVERY_STEP = 1e-9  # [min]
 # 28 windows and 16 in a batch: every stop is within an epoch.
-CLIPS = [swaying(30)]
+CLIPS, OTHER = [swaying(30)], swaying(16, name="other", degrees=30.0)
 
 
 def shaken(motion):
@@ -65,75 +64,25 @@ def same_model(a, b):
 
 
 @pytest.mark.parametrize(
-    ("kind", "recipe"),
+    ("kind", "options"),
     [
-        ("snug", replace(DEFAULT, mixed=2.0)),
-        ("snug", PAPER),
-        ("tailornet", TAILORNET),
+        ("snug", {"recipe": replace(DEFAULT, mixed=2.0)}),
+        ("snug", {"recipe": PAPER, "validation": Validation(motions=[OTHER], every=3, patience=5)}),
+        ("tailornet", {"recipe": TAILORNET}),
     ],
-    ids=["mixed", "paper", "tailornet"],
+    ids=["mixed", "paper, validated", "tailornet"],
 )
-def test_a_stopped_run_resumes_bit_for_bit(kind, recipe, tmp_path, narrow):
-    whole = short(kind, recipe=recipe)
+def test_a_stopped_run_resumes_bit_for_bit(kind, options, tmp_path, narrow):
+    whole = short(kind, **options)
     checkpoint = Checkpoint(path=tmp_path / "run.safetensors", minutes=EVERY_STEP, resume=True)
     for after in (2, 5):  # the second time a resumed run
-        stopped(short, kind, recipe=recipe, checkpoint=checkpoint, after=after)
-    resumed = short(kind, recipe=recipe, checkpoint=checkpoint)
+        stopped(short, kind, checkpoint=checkpoint, after=after, **options)
+    resumed = short(kind, checkpoint=checkpoint, **options)
     same_model(whole, resumed)
     assert resumed.history[-1]["step"] == STEPS and list(tmp_path.iterdir()) == [checkpoint.path]
     checkpoint.delete()
     assert not list(tmp_path.iterdir())
-    same_model(whole, short(kind, recipe=recipe, checkpoint=checkpoint))  # no checkpoint: from the beginning
-
-
-def test_validation_resumes_bit_for_bit(tmp_path):
-    validation = Validation(motions=[swaying(16, name="other", degrees=30.0)], every=3, patience=5)
-    whole = short(steps=10, validation=validation)
-    checkpoint = Checkpoint(path=tmp_path / "run.safetensors", minutes=EVERY_STEP, resume=True)
-    stopped(short, steps=10, validation=validation, checkpoint=checkpoint, after=7)
-    same_model(whole, short(steps=10, validation=validation, checkpoint=checkpoint))
-    assert whole.summary["validation"]["motions"] == ["other"]
-
-
-DRESSED = tube_dress()
-SIMULATED = {"sway": DRESSED.skinned(CLIPS[0], smoothing=20)}
-STIFF = replace(DRESSED.garment, material=Material(young_modulus=1e6))
-
-
-@pytest.mark.parametrize(
-    ("kind", "first", "then", "message"),
-    [
-        ("snug", {}, {"seed": 1}, "another seed"),
-        ("snug", {}, {"clips": [swaying(31)]}, "another data"),
-        ("snug", {}, {"dressed": DressedBody(DRESSED.body, STIFF)}, "another material"),
-        (
-            "supervised",
-            {"trajectories": SIMULATED},
-            {"trajectories": {"sway": SIMULATED["sway"] + 0.01}},
-            "another data",
-        ),
-    ],
-)
-def test_a_checkpoint_of_another_run_is_refused(kind, first, then, message, tmp_path):
-    checkpoint = Checkpoint(path=tmp_path / "run.safetensors", minutes=EVERY_STEP, resume=True)
-    stopped(short, kind, checkpoint=checkpoint, after=1, **first)
-    with pytest.raises(TensorFileError, match=message):
-        short(kind, checkpoint=checkpoint, **then)
-
-
-def test_a_checkpoint_of_other_threads_an_older_version_or_broken_is_refused(tmp_path, monkeypatch):
-    checkpoint = Checkpoint(path=tmp_path / "run.safetensors", minutes=EVERY_STEP, resume=True)
-    stopped(short, checkpoint=checkpoint, after=1)
-    with monkeypatch.context() as patch:
-        patch.setattr(torch, "get_num_threads", lambda: 7)
-        with pytest.raises(TensorFileError, match="another threads"):
-            short(checkpoint=checkpoint)
-    monkeypatch.setattr(checkpoints, "CHECKPOINT_FORMAT", "snug-checkpoint-99")
-    with pytest.raises(TensorFileError, match=r"run\.safetensors: no checkpoint of this version"):
-        short(checkpoint=checkpoint)
-    checkpoint.path.write_bytes(checkpoint.path.read_bytes()[:300])
-    with pytest.raises(TensorFileError, match=r"run\.safetensors"):
-        short(checkpoint=checkpoint)
+    same_model(whole, short(kind, checkpoint=checkpoint, **options))  # no checkpoint: from the beginning
 
 
 def no_space(*_):
@@ -165,3 +114,27 @@ def test_command_resumes_what_was_interrupted(tailored_once, tmp_path, monkeypat
     assert "4 steps" in shown and "validation" in shown
     assert [path.name for path in tmp_path.iterdir()] == ["small.safetensors"]
     assert train.main(arguments) == 0 and "nothing to resume" in capsys.readouterr().out
+
+
+DRESSED = tube_dress()
+STIFF = replace(DRESSED.garment, material=Material(young_modulus=1e6))
+
+
+@pytest.mark.parametrize(
+    ("kind", "then", "now", "message"),
+    [
+        ("snug", {"seed": 1}, (), "another seed"),
+        ("snug", {"clips": [swaying(31)]}, (), "another data"),
+        ("snug", {"dressed": DressedBody(DRESSED.body, STIFF)}, (), "another material"),
+        ("supervised", {"trajectories": {"sway": DRESSED.skinned(CLIPS[0]) + 0.01}}, (), "another data"),
+        ("snug", {}, (torch, "get_num_threads", lambda: 7), "another threads"),
+        ("snug", {}, (checkpoints, "CHECKPOINT_FORMAT", "snug-checkpoint-99"), "no checkpoint of this vers"),
+    ],
+)
+def test_a_checkpoint_of_another_run_is_refused(kind, then, now, message, tmp_path, monkeypatch):
+    checkpoint = Checkpoint(path=tmp_path / "run.safetensors", minutes=EVERY_STEP, resume=True)
+    stopped(short, kind, checkpoint=checkpoint, after=1)
+    if now:
+        monkeypatch.setattr(*now)
+    with pytest.raises(TensorFileError, match=message):
+        short(kind, checkpoint=checkpoint, **then)

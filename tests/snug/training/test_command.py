@@ -33,8 +33,3 @@ def test_command_line_refuses_what_it_could_not_do(arguments, hint, refused, tmp
     np.savez(tmp_path / "a.npz", poses=np.zeros((9, 72)), trans=np.zeros((9, 3)))
     given = ["-o", str(tmp_path / "model.safetensors"), "--vertices", "200"]
     refused(hint, main, [*given, *arguments.format(tmp_path).split()])
-
-
-def test_each_model_has_a_file_of_its_own():
-    assert parse_options(["--model", "pbns"]).out.name == "pbns.safetensors"
-    assert parse_options(["--model", "pbns", "-o", "mine.safetensors"]).out.name == "mine.safetensors"

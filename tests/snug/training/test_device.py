@@ -15,17 +15,13 @@ from snug.body.skinning import skin
 from snug.kernels.contact import byte_normals
 from snug.kernels.skinning import from_lanes, to_lanes
 from snug.named_recipes import PAPER
-from snug.recipe import DEFAULT
 from snug.training import contact_planes
 from snug.training.contact_cache import ContactCache, Patch
 from snug.training.contact_cache_torch import TensorContactCache
 from snug.training.device import CPU
 from snug.training.optimisation_step import Trainer
 from snug.training.physics_loss import STATIC
-from snug.training.training_set import TrainingSet
-from tests.snug.training.dressing import planes_of, swaying, tube_dress
-
-PLAIN = replace(DEFAULT, mixed=0.0)
+from tests.snug.training.dressing import PLAIN, planes_of, swaying, tube_dress
 
 
 def made(recipe, *, kernels, kind="snug"):
@@ -147,15 +143,6 @@ def test_a_step_makes_nothing_but_where_it_is_told_to(recipe, monkeypatch):
     with Unplaced() as unplaced:
         row = trainer.step(0)
     assert unplaced.found == [] and np.isfinite(row["loss"])
-
-
-def test_a_set_lies_where_it_is_told_to():
-    meta = torch.device("meta")
-    data = TrainingSet(tube_dress(), [swaying(12)], PAPER, features="motion", sequences=True, device=meta)
-    batch = data.batch(np.array([0, 1]), np.zeros((2, 10)))
-    for tensor in (batch.features, batch.rest, batch.transforms, batch.ahead, batch.betas):
-        assert tensor.device == meta
-    assert batch.transforms.shape == (2, 3, 24, 3, 4) and batch.rest.shape == (2, 1, 150, 3)
 
 
 def lane_by_lane(kernel, x):

@@ -6,34 +6,17 @@ import numpy as np
 import pytest
 import torch
 
-from snug.recipe import DEFAULT
 from snug.training import contact_planes, optimisation_step
 from snug.training.divergence_guard import PATIENCE, SETTLING, SNAPSHOT_EVERY
-from snug.training.optimisation_step import Trainer
 from snug.training.train_network import TrainingLoop
 from snug.training.training_set import TrainingError
-from tests.snug.training.dressing import swaying, tube_dress
-
-PLAIN = replace(DEFAULT, mixed=0.0)
-
-
-def test_guard_names_a_window_and_keeps_the_weights():
-    trainer = Trainer("snug", tube_dress(), [swaying(120)], steps=8, seed=0, recipe=PLAIN)
-    before = trainer.network.offsets.weight.clone()
-    trainer.data.features[20] = float("nan")  # in 3 of 118 windows: in at most 3 of the first 8 batches
-    for number in range(8):
-        trainer.step(number)
-    assert 1 <= trainer.guard.summary["skipped_updates"] <= 3
-    named = trainer.guard.summary["named_windows"][0]
-    assert named["action"] == "update left out" and "motion 'sway' frame" in named["window"]
-    after = trainer.network.offsets.weight
-    assert torch.isfinite(after).all() and not torch.equal(before, after)
+from tests.snug.training.dressing import PLAIN, make_trainer
 
 
 def test_guard_counts_high_windows_and_clips(monkeypatch):
     monkeypatch.setattr(optimisation_step, "GRADIENT_LIMIT", 1e-3)
     recipe = replace(PLAIN, spike=1e-6)
-    trainer = Trainer("snug", tube_dress(), [swaying(30)], steps=99, seed=0, recipe=recipe)
+    trainer = make_trainer(recipe)
     trainer.step(0)
     assert trainer.guard.summary["high_windows"] == 0  # the first steps are not judged
     trainer.step(60)
@@ -43,14 +26,10 @@ def test_guard_counts_high_windows_and_clips(monkeypatch):
 
 
 def test_training_gives_up_with_a_reason():
-    trainer = Trainer("snug", tube_dress(), [swaying(30)], steps=200, seed=0, recipe=PLAIN)
+    trainer = make_trainer(steps=200)
     trainer.data.features[:] = float("nan")
     with pytest.raises(TrainingError, match=r"diverged.*motion 'sway' frame"):
         TrainingLoop(trainer, every=10).run()
-
-
-def made(recipe=PLAIN, frames=30):
-    return Trainer("snug", tube_dress(), [swaying(frames)], steps=400, seed=0, recipe=recipe)
 
 
 def weights_of(trainer):
@@ -59,7 +38,7 @@ def weights_of(trainer):
 
 def test_lost_weights_come_back():
     """A gradient that is not finite ruins the weights, and with them every later batch."""
-    trainer = made()
+    trainer = make_trainer()
     for number in range(SNAPSHOT_EVERY + 3):
         trainer.step(number)
     before = weights_of(trainer)
@@ -77,7 +56,7 @@ def test_lost_weights_come_back():
 
 def test_a_gradient_that_is_not_finite_is_not_followed():
     """Its energies are fine, so nothing else would tell."""
-    trainer = made()
+    trainer = make_trainer()
     for number in range(3):
         trainer.step(number)
     before = weights_of(trainer)
@@ -93,7 +72,7 @@ def test_a_gradient_that_is_not_finite_is_not_followed():
 
 
 def test_runaway_energy_brings_good_weights_back():
-    trainer = made()
+    trainer = make_trainer()
     for number in range(SETTLING + 1):
         usual = trainer.step(number)["loss"]
     with torch.no_grad():  # finite, but centimetres of noise
@@ -106,7 +85,7 @@ def test_runaway_energy_brings_good_weights_back():
 @pytest.mark.parametrize("usual", [0.4, 0.01, -0.01, -0.8])
 def test_an_energy_around_zero_makes_no_runaway_of_one_high_window(usual):
     """Trousers hang below the pelvis, where their height, and with it their energy, is negative."""
-    guard = made().guard
+    guard = make_trainer().guard
     batch = np.full(16, usual)
     for number in range(SETTLING + 1):
         assert guard.judge(number, batch, str) == "update"
@@ -117,7 +96,7 @@ def test_an_energy_around_zero_makes_no_runaway_of_one_high_window(usual):
 
 
 def test_data_that_is_not_finite_does_not_wear_down_the_rate():
-    trainer = made()
+    trainer = make_trainer()
     trainer.step(0)
     good = weights_of(trainer)
     trainer.data.features[:] = float("nan")
@@ -131,7 +110,7 @@ def test_a_high_window_has_its_anchors_searched_before_it_is_judged(monkeypatch)
     """Anchors from the wrong side of the body claim a contact that is none."""
     monkeypatch.setattr(contact_planes, "REFRESH", 0.0)
     recipe = replace(PLAIN, batch=8)
-    trainer = made(recipe)
+    trainer = make_trainer(recipe)
     row = trainer.step(SETTLING)
     usual = row["collision"]
     anchors = trainer.contact.cache

@@ -36,16 +36,6 @@ def test_with_weights_that_stand_still_what_is_remembered_becomes_a_roll_out():
         assert trainer.hidden_states.states[:, first : first + 2].abs().max() == 0.0  # these end no window
 
 
-def test_windows_start_from_what_is_remembered():
-    trainer = made()
-    assert trainer.hidden_states is not None
-    trainer.hidden_states.states[:] = 0.5
-    seen = []
-    trainer.network.register_forward_pre_hook(lambda network, given: seen.append(given[1]))
-    trainer.step(0)
-    assert torch.equal(seen[0], torch.full_like(seen[0], 0.5))
-
-
 def test_nothing_is_remembered_where_each_window_has_another_body():
     assert made(replace(RECIPE, shape_range=1.0)).hidden_states is None and made().hidden_states is not None
     assert made(replace(RECIPE, shape_range=1.0, shape_of="clip", mixed=1.0)).hidden_states is not None

@@ -5,21 +5,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
+from safetensors.torch import save_file
 
 from snug.kinds import KINDS
 from snug.named_recipes import PAPER
 from snug.networks import trained_model
 from snug.networks.roll_out import roll_out
-from snug.networks.tensor_file import read_tensors
 from snug.networks.trained_model import ModelFileError, TrainedModel
 from snug.recipe import DEFAULT
 from snug.training.augmentation import augment
 from snug.training.optimisation_step import Trainer
 from snug.training.train_network import train_network, untrained_model
-from snug.training.training_set import TrainingError, TrainingSet
-from tests.snug.training.dressing import leaning, swaying, tube_dress
-
-PLAIN = replace(DEFAULT, mixed=0.0)
+from snug.training.training_set import TrainingSet
+from tests.snug.training.dressing import PLAIN, leaning, make_trainer, swaying, tube_dress
 
 
 def short(kind="snug", *, steps=60, seed=0, recipe=PLAIN, motions=None, **options):
@@ -28,12 +26,8 @@ def short(kind="snug", *, steps=60, seed=0, recipe=PLAIN, motions=None, **option
     return train_network(kind, tube_dress(), clips, steps=steps, seed=seed, recipe=recipe, **options)
 
 
-@pytest.fixture(scope="module")
-def trained():
-    return short(steps=100)
-
-
-def test_training_lowers_the_potential(trained):
+def test_training_lowers_the_potential():
+    trained = short(steps=100)
     first, last = trained.history[0], trained.history[-1]
     assert last["loss"] < 0.9 * first["loss"] and last["strain"] < first["strain"]
     parts = sum(last[term] for term in DEFAULT.terms)
@@ -46,72 +40,12 @@ def test_training_lowers_the_potential(trained):
 )
 def test_rate_follows_its_schedule(schedule, wanted):
     recipe = replace(PLAIN, schedule=schedule)
-    trainer = Trainer("snug", tube_dress(), [swaying(30)], steps=40, seed=0, recipe=recipe)
+    trainer = make_trainer(recipe, steps=40)
     for number, epoch, share in zip((0, 20, 40), (1, 10, 11), wanted):
         trainer.epoch = epoch
         trainer._set_rate(number)
         rate = trainer.optimiser.param_groups[0]["lr"]
         assert rate == pytest.approx(share * PLAIN.learning_rate, rel=1e-9)
-
-
-def test_model_survives_its_file(trained, tmp_path):
-    path = trained.save(tmp_path / "deep" / "model.safetensors")
-    loaded = TrainedModel.load(path)
-    assert [p.name for p in path.parent.iterdir()] == ["model.safetensors"]
-    assert (loaded.kind, loaded.recipe, loaded.steps) == ("snug", trained.recipe, 100)
-    assert loaded.history == trained.history and loaded.megabytes == trained.megabytes
-    assert read_tensors(path)[1]["unit"] == "J"  # of the losses, for whoever draws them
-
-
-def test_broken_model_files_are_named(tmp_path, trained, monkeypatch):
-    from safetensors.torch import save_file
-
-    with pytest.raises(ModelFileError, match="no such model"):
-        TrainedModel.load(tmp_path / "none.safetensors")
-    broken = tmp_path / "broken.safetensors"
-    broken.write_bytes(trained.save(tmp_path / "m.safetensors").read_bytes()[:2000])
-    with pytest.raises(ModelFileError, match=r"broken\.safetensors"):
-        TrainedModel.load(broken)
-    foreign = tmp_path / "foreign.safetensors"
-    save_file({"a": torch.zeros(2)}, foreign)
-    with pytest.raises(ModelFileError, match="no model of this project"):
-        TrainedModel.load(foreign)
-    with monkeypatch.context() as version:
-        version.setattr(trained_model, "MODEL_FORMAT", "snug-model-5")
-        old = trained.save(tmp_path / "old.safetensors")
-    with pytest.raises(ModelFileError, match=r"old\.safetensors: format 'snug-model-5', this version reads"):
-        TrainedModel.load(old)
-
-
-def test_supervised_names_unfit_targets():
-    dressed, motion = tube_dress(), swaying(30)
-    good = dressed.skinned(motion)
-    with pytest.raises(TrainingError, match="needs trajectories"):
-        short("supervised")
-    with pytest.raises(TrainingError, match="'sway'"):
-        short("supervised", trajectories={"walk": good})
-    with pytest.raises(TrainingError, match=r"shape \(29, 150, 3\), expected \(30, 150, 3\)"):
-        short("supervised", trajectories={"sway": good[:-1]})
-    good[17, 3] = np.nan
-    with pytest.raises(TrainingError, match="frame 17"):
-        short("supervised", trajectories={"sway": good})
-
-
-def test_paper_recipe_varies_the_body(monkeypatch):
-    shapes = []
-    whole = TrainingSet.batch
-
-    def spy(self, windows, betas):
-        shapes.append(betas)
-        return whole(self, windows, betas)
-
-    monkeypatch.setattr(TrainingSet, "batch", spy)
-    model = short(recipe=PAPER, steps=8)
-    assert all(np.isfinite(row["loss"]) for row in model.history)
-    betas = np.concatenate(shapes)
-    assert (
-        betas.shape == (8 * 16, 10) and betas.max() > 2.5 and betas.min() < -2.5 and np.abs(betas).max() <= 3
-    )
 
 
 SHAPED = replace(DEFAULT, shape_range=3.0, shape_of="clip")
@@ -146,19 +80,6 @@ def test_other_skeletons_pose_as_the_body_does():
     assert torch.allclose(batch.features[1], dressed.features(motion, PLAIN, betas[1])[5:8], atol=1e-6)
 
 
-def test_impossible_trainings_are_refused():
-    with pytest.raises(TrainingError, match="steps=0"):
-        short(steps=0)
-    with pytest.raises(TrainingError, match="has 3 frames"):
-        short(motions=[swaying(2)])
-    with pytest.raises(TrainingError, match="one frame rate"):
-        short(motions=[swaying(30), swaying(30, fps=60.0)])
-    with pytest.raises(ValueError, match=r"'gnn'.*snug, pbns, supervised"):
-        short("gnn")
-    with pytest.raises(TrainingError, match="no motions"):
-        train_network("snug", tube_dress(), [], steps=1, seed=0)
-
-
 def test_untrained_is_not_skinning_alone():
     dressed, motion = tube_dress(), swaying()
     model = untrained_model("snug", dressed, [motion], seed=0)
@@ -166,9 +87,51 @@ def test_untrained_is_not_skinning_alone():
     assert 1e-3 < np.abs(gap).max() < 0.1 and model.steps == 0
 
 
-@pytest.mark.parametrize("kind", ["snug", "pbns", "ncs-static"])
-def test_without_a_recipe_the_kinds_own_is_taken(kind):
+def test_without_a_recipe_the_kinds_own_is_taken():
+    kind = "pbns"
     model = train_network(kind, tube_dress(), [swaying(30)], steps=1, seed=0, progress=False)
     assert model.recipe == KINDS[kind].recipe
     untrained = untrained_model(kind, tube_dress(), [swaying(30)], seed=0)
     assert untrained.recipe == replace(KINDS[kind].recipe, zero_last_layer=False)
+
+
+def test_files_that_are_no_models_are_named(tmp_path, monkeypatch):
+    save_file({"a": torch.zeros(2)}, tmp_path / "foreign.safetensors")
+    monkeypatch.setattr(trained_model, "MODEL_FORMAT", "snug-model-5")
+    untrained_model("pbns", tube_dress(), [swaying()], seed=0).save(tmp_path / "old.safetensors")
+    monkeypatch.undo()
+    for name, message in (("none", "no such model"), ("foreign", "no model of this project"),
+                          ("old", r"old\.safetensors: format 'snug-model-5', this version reads")):  # fmt: skip
+        with pytest.raises(ModelFileError, match=message):
+            TrainedModel.load(tmp_path / f"{name}.safetensors")
+
+
+GOOD = tube_dress().skinned(swaying(30))
+BROKEN = np.where(np.arange(30)[:, None, None] == 17, np.nan, GOOD)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"kind": "supervised"}, "needs trajectories"),
+        ({"kind": "supervised", "trajectories": {"walk": GOOD}}, "'sway'"),
+        ({"kind": "supervised", "trajectories": {"sway": GOOD[:-1]}}, r"\(29, 150, 3\), expected \(30, 150"),
+        ({"kind": "supervised", "trajectories": {"sway": BROKEN}}, "frame 17"),
+        ({"steps": 0}, "steps=0"),
+        ({"motions": [swaying(2)]}, "has 3 frames"),
+        ({"motions": [swaying(30), swaying(30, fps=60.0)]}, "one frame rate"),
+        ({"kind": "gnn"}, r"'gnn'.*snug, pbns, supervised"),
+    ],
+)
+def test_impossible_trainings_are_refused(given, message):
+    with pytest.raises(ValueError, match=message):
+        short(**given)
+
+
+def test_paper_recipe_varies_the_body(monkeypatch):
+    trainer, shapes = make_trainer(PAPER), []
+    monkeypatch.setattr(trainer, "learn", lambda number, windows, betas, state: shapes.append(betas) or {})
+    for number in range(8):
+        trainer.step(number)
+    betas = np.concatenate(shapes)
+    assert betas.shape == (8 * 16, 10) and 2.5 < betas.max() <= 3 and -3 <= betas.min() < -2.5

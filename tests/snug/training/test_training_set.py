@@ -6,12 +6,9 @@ import numpy as np
 
 from snug.body.skeleton import JOINT
 from snug.motion.motion import Motion
-from snug.recipe import DEFAULT
 from snug.training.optimisation_step import Trainer
 from snug.training.training_set import TrainingSet
-from tests.snug.training.dressing import swaying, tube_dress
-
-PLAIN = replace(DEFAULT, mixed=0.0)
+from tests.snug.training.dressing import PLAIN, swaying, tube_dress
 
 
 def test_windows_stay_within_a_motion_and_all_come_by():

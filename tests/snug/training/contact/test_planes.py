@@ -16,10 +16,9 @@ from snug.training import contact_planes
 from snug.training.augmentation import augment
 from snug.training.contact_planes import MARKED, NEAR, REACH
 from snug.training.optimisation_step import Trainer
-from tests.snug.training.dressing import swaying, tube_dress
+from tests.snug.training.dressing import PLAIN, swaying, tube_dress
 
 MOTIONS = [swaying(30), swaying(11, name="slow", degrees=10.0)]
-PLAIN = replace(DEFAULT, mixed=0.0)
 
 
 def made(motions=MOTIONS, **options):
