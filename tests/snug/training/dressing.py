@@ -75,8 +75,6 @@ def planes_of(anchors, frames, rows, positions, normals) -> tuple[np.ndarray, np
     return points, directions / np.linalg.norm(directions, axis=-1, keepdims=True)
 
 
-def make_trainer(
-    recipe: Recipe = PLAIN, *, kind: str = "snug", frames: int = 30, steps: int = 400
-) -> Trainer:
-    """A trainer of the tube on one swaying motion."""
-    return Trainer(kind, tube_dress(), [swaying(frames)], steps=steps, seed=0, recipe=recipe)
+def make_trainer(recipe: Recipe = PLAIN, *, steps: int = 400) -> Trainer:
+    """A trainer of SNUG for the tube on one swaying motion."""
+    return Trainer("snug", tube_dress(), [swaying(30)], steps=steps, seed=0, recipe=recipe)

@@ -100,8 +100,11 @@ def test_files_that_are_no_models_are_named(tmp_path, monkeypatch):
     monkeypatch.setattr(trained_model, "MODEL_FORMAT", "snug-model-5")
     untrained_model("pbns", tube_dress(), [swaying()], seed=0).save(tmp_path / "old.safetensors")
     monkeypatch.undo()
-    for name, message in (("none", "no such model"), ("foreign", "no model of this project"),
-                          ("old", r"old\.safetensors: format 'snug-model-5', this version reads")):  # fmt: skip
+    for name, message in (
+        ("none", "no such model"),
+        ("foreign", "no model of this project"),
+        ("old", r"old\.safetensors: format 'snug-model-5', this version reads"),
+    ):
         with pytest.raises(ModelFileError, match=message):
             TrainedModel.load(tmp_path / f"{name}.safetensors")
 
