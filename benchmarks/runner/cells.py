@@ -23,14 +23,7 @@ if TYPE_CHECKING:
     from benchmarks.validation.case import Case
     from reference_sim import Trajectory
 
-# Status of a trajectory -> status of a result row. A solver stopped on purpose is ok.
-STATUS_OF = {
-    "converged": "ok",
-    "ok": "ok",
-    "stalled": "stalled",
-    "diverged": "diverged",
-    "timeout": "timeout",
-}
+STATUSES = ("converged", "ok", "stalled", "diverged", "timeout")  # of a trajectory
 BATCH = 16  # bodies at once, where a method can
 INPUTS = 0.1  # of the time measured of a run, for its inputs: a few equal milliseconds a frame
 UNBELIEVABLE = "its time cannot be believed: "
@@ -212,9 +205,9 @@ def judge(
         return ended, reason or f"ended after {trajectory.frames} of {scene.frames} frames"
     if trajectory.status == "max_iterations":
         return ("ok", "") if truncated else ("stalled", reason)
-    if trajectory.status not in STATUS_OF:
-        return "failed", f"unknown status '{trajectory.status}', use one of {', '.join(STATUS_OF)}; {reason}"
-    status = STATUS_OF[trajectory.status]
+    if trajectory.status not in STATUSES:
+        return "failed", f"unknown status '{trajectory.status}', use one of {', '.join(STATUSES)}; {reason}"
+    status = "ok" if trajectory.status == "converged" else trajectory.status
     if status != "ok" and not truncated and "converged" in trajectory.frame_fields:
         bad = int((trajectory.frame_fields["converged"] < 0.5).sum())
         reason = f"{bad} of {trajectory.frames} frames did not converge; {reason}"

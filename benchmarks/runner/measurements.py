@@ -113,13 +113,9 @@ def measured(
                 values |= compared(roll_out, measurements.compare)
             metrics |= {find_metric(name, outside).name: number(name, v) for name, v in values.items()}
             curves |= measurements.series(roll_out) if measurements.series else {}
-            said = measurements.judge(roll_out, values) if measurements.judge else None
-            if said and (not isinstance(said, tuple) or len(said) != 2 or said[0] not in STATUSES):
-                statuses = ", ".join(STATUSES)
-                raise ValueError(
-                    f"judge() gives {said!r}: expected None, or a status ({statuses}) and a reason"
-                )
-            ended = said or ended
+            ended = (measurements.judge(roll_out, values) if measurements.judge else None) or ended
+            if ended[0] not in STATUSES:
+                raise ValueError(f"judge() gives {ended!r}: expected None, or a status and a reason")
         except Exception as error:
             raise RuntimeError(f"{measurements.name}: {one_line(error)}") from error
     return metrics, curves, ended
