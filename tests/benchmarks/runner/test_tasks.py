@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import os
 import signal
+import subprocess
 import sys
 from functools import partial
 from pathlib import Path
@@ -12,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from benchmarks.method import WorkerDied
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.executor import Executor, TaskProcess
@@ -20,6 +22,7 @@ from benchmarks.runner.loop import Runner, _batches
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.runner.task import Context, Outcome, RunStopped, Task
 from tests.benchmarks.plan.planned import planned
+from tests.benchmarks.runner.cluster_by_hand import alive, until
 from tests.benchmarks.runner.misbehaving import loaded_modules
 from tests.benchmarks.runner.tasks_by_hand import InProcess
 
@@ -36,6 +39,9 @@ def fail(how: str) -> None:
         signal.pause()
     if how == "torch":
         raise RuntimeError("DefaultCPUAllocator: can't allocate memory")
+    if how == "leave":
+        child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
+        raise WorkerDied(str(child.pid), "timeout")
     if how == "interrupt":
         raise KeyboardInterrupt
     if how == "stop":
@@ -250,6 +256,15 @@ def test_a_named_process_is_kept_until_it_is_released(tmp_path):
         assert executor.alone(second, {}).result["memo"] == ["second"]
     finally:
         executor.close()
+
+
+def test_what_a_task_has_started_ends_when_its_time_is_up(tmp_path):
+    process = TaskProcess(RunFolder(tmp_path), None)
+    outcome = process.do(task("one", "leave"), {})
+    assert outcome.status == "timeout"
+    until(lambda: not alive(int(outcome.reason)), 5.0)
+    assert process.do(task("two"), {}).result["memo"] == ["two"]
+    process.close()
 
 
 def test_a_process_that_cannot_start_is_a_failure_each_time(tmp_path):
