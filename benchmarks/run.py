@@ -13,7 +13,7 @@ from pathlib import Path
 
 from benchmarks.declarations import DeclarationError
 from benchmarks.external.roll_out_files import RollOutFileError
-from benchmarks.plan.options import PROGRAM, make_parser, refuse_former, study_of
+from benchmarks.plan.options import PROGRAM, list_names, make_parser, refuse_former, study_of
 from benchmarks.plan.plan import Plan, make_plan
 from benchmarks.runner.task import RunRefused, RunStopped
 from benchmarks.timing import one_thread
@@ -28,8 +28,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
         options = make_parser().parse_args(command_line)
         study = study_of(options, options.study)
         if options.list:
-            from benchmarks.plan.options import list_names
-
             print(list_names(study))
             return 0
         plan = make_plan(

@@ -91,15 +91,13 @@ class DirectOptimisation(Method):
 
     def prepare(self, scene: BuiltScene) -> None:
         """Lay the frames out as one cloth and start from skinning. Raises ValueError for other terms."""
-        assert scene.dressed is not None
         if _identity(scene.energies) != _identity(declared_energies(scene.cloth)):
             names = ", ".join(term.name for term in scene.energies)
             raise ValueError(
                 f"direct optimisation minimises the paper's terms, scene {scene.name} has: {names}"
             )
-        self.scene, motion = scene, scene.dressed.motion
-        dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
-        self.start = dressed.skinned(motion, scene.dressed.betas, smoothing=DEFAULT.smoothing)
+        assert scene.skinned is not None
+        self.scene, self.start = scene, scene.skinned
         one, frames = scene.cloth, scene.frames
         faces = one.faces + one.vertex_count * np.arange(frames)[:, None, None]
         # Side by side: a rest state is only sound where no two vertices coincide.

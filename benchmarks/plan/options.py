@@ -173,5 +173,5 @@ def list_names(study: Study) -> str:
     lines = []
     for title, rows in sections.items():
         width = max(map(len, rows), default=0)
-        lines += [title, *(f"  {name:<{width}}  {text}".rstrip() for name, text in rows.items()), ""]
-    return "\n".join(lines[:-1])
+        lines += ["", title, *(f"  {name:<{width}}  {text}".rstrip() for name, text in rows.items())]
+    return "\n".join(lines[1:])

@@ -191,14 +191,9 @@ def find_scene(name: str, garment: str = "tshirt") -> Scene:
 
 
 def further_scenes(garment: str) -> tuple[Scene, ...]:
-    """Return FURTHER_SCENES with that garment on the body.
-
-    For another garment than the T-shirt those are left out that tailor one.
-    """
-    if garment == GARMENT_SCENES[0].garment:
-        return FURTHER_SCENES
-    kept = (scene for scene in FURTHER_SCENES if not scene.own_garment)
-    return tuple(replace(scene, garment=garment) if scene.dressed else scene for scene in kept)
+    """Return FURTHER_SCENES with that garment on the body, but for those that tailor another."""
+    kept = (s for s in FURTHER_SCENES if not s.own_garment or s.garment == garment)
+    return tuple(replace(scene, garment=garment) for scene in kept)
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,12 @@ import torch
 
 from benchmarks.assets import open_assets
 from benchmarks.methods.lower_bounds import ClipInertia, DirectOptimisation
+from benchmarks.methods.simulation import Simulation
 from benchmarks.metrics.energy import energy_series
 from benchmarks.presets import find_preset
-from benchmarks.scenes import of_garment
 from reference_sim.cloth import Cloth
 from reference_sim.energies import ContactPenalty, Inertia
-from snug.networks.dressed_body import DressedBody
+from tests.benchmarks.runner.tasks_by_hand import dressed_scene
 from tests.snug.training.dressing import swaying, tube_dress
 
 FRAMES = 6
@@ -26,8 +26,7 @@ def scene():
     """A T-shirt: what no shoulder holds falls without end, and has no bound."""
     preset = dataclasses.replace(find_preset("smoke"), frames=FRAMES)
     assets = open_assets(preset, [swaying(FRAMES)], ["tshirt"])
-    built = of_garment("tshirt").scene("sway").at(preset).build(assets)
-    return dataclasses.replace(built, origin_heights=None)
+    return dataclasses.replace(dressed_scene("sway", preset=preset).build(assets), origin_heights=None)
 
 
 @pytest.fixture(scope="module")
@@ -71,17 +70,11 @@ def test_the_sum_is_that_of_the_energy_metric(scene, bound):
 
 
 def test_the_bound_is_far_below_skinning_and_below_a_simulation(scene, bound):
-    from reference_sim import simulate
-
-    _, trajectory = bound
-    simulated = simulate(
-        scene.cloth, scene.energies, dt=scene.dt, frames=FRAMES, obstacle=scene.obstacle, start=scene.start
-    )
-    dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
-    skinned = dressed.skinned(scene.dressed.motion, smoothing=20)
-    clips = (trajectory.positions, simulated.positions, skinned)
+    (_, trajectory), simulation = bound, Simulation()
+    simulation.prepare(scene)
+    clips = (trajectory.positions, simulation.run().positions, scene.skinned)
     free, reference, start = (s["total"].sum() for s in energy_series(scene, clips))
-    assert trajectory.status == "ok" and trajectory.positions.shape == skinned.shape
+    assert trajectory.status == "ok" and trajectory.positions.shape == scene.skinned.shape
     assert free < reference < start
     sums = trajectory.provenance["sums_J"]
     assert len(sums) > 1 and sums[-1] < sums[0]

@@ -15,15 +15,13 @@ TINY = dataclasses.replace(find_preset("smoke"), sheet_cells=3, sheet_frames=6)
 SCENE = {scene.name: scene for scene in SCENES}
 
 METHOD = """
-from dataclasses import dataclass
 import numpy as np
-from benchmarks.method import Method, MethodEntry
+from benchmarks import Method, MethodEntry
 from reference_sim import Trajectory
 from {helper} import place
 
 METHODS = (MethodEntry(name="{name}", label="{label}", description="exact", role="solver", files=("a.txt",)),)
 
-@dataclass
 class Exact(Method):
     def prepare(self, scene):
         self.scene = scene
