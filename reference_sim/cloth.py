@@ -58,13 +58,10 @@ class Cloth:
         faces = np.asarray(self.faces)
         check_mesh(positions, faces)
         faces = np.array(faces, dtype=np.int64, order="C")
-        pins = np.asarray(self.pins)
-        if pins.size and not np.issubdtype(pins.dtype, np.integer):
-            raise MeshError(f"pins are {pins.dtype}: give the indices of the pinned vertices")
-        pins = np.unique(pins).astype(np.int64)
-        if pins.size and (pins[0] < 0 or pins[-1] >= len(positions)):
-            bad = pins[0] if pins[0] < 0 else pins[-1]
-            raise MeshError(f"pin {bad} is no vertex of 0..{len(positions) - 1}")
+        pins = np.unique(np.asarray(self.pins))
+        if pins.size and not (pins.dtype.kind in "iu" and pins[0] >= 0 and pins[-1] < len(positions)):
+            raise MeshError(f"pins {pins[0]} to {pins[-1]}: give indices from 0 to {len(positions) - 1}")
+        pins = pins.astype(np.int64)
         uv = self.rest_uv
         if uv is not None:
             uv = np.array(uv, dtype=np.float64, order="C")

@@ -49,7 +49,6 @@ class TimeStepper:
     All that many runs of one scene can share is set up here; `start_again` stands between two of them.
 
     Args:
-        cloth: the rest state.
         energies: the terms of Phi. Inertia is added here; no other term is.
         dt: time between frames [s].
         substeps: backward-Euler steps per frame. Each is a minimisation; frame fields then hold sums of

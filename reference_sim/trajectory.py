@@ -106,8 +106,6 @@ class Trajectory:
             return _read(Path(path))
         except FileNotFoundError:
             raise TrajectoryError(f"{path}: no such trajectory file") from None
-        except ImportError:
-            raise
         except Exception as error:  # whatever h5py and numpy raise for a file that is none, or is damaged
             reason = " ".join(str(error).split())
             raise TrajectoryError(f"{path}: not a VTKHDF trajectory of this project ({reason})") from None
@@ -205,9 +203,6 @@ def write_point_cache(path: str | Path, trajectory: Trajectory) -> tuple[Path, P
 
     Each file is written whole or not at all.
 
-    Raises:
-        ValueError: the name does not end in .pc2.
-
     >>> import tempfile
     >>> faces, times = np.array([[0, 1, 2]]), np.array([0.0, 1 / 30])
     >>> with tempfile.TemporaryDirectory() as folder:
@@ -216,8 +211,6 @@ def write_point_cache(path: str | Path, trajectory: Trajectory) -> tuple[Path, P
     (2, 3, 3)
     """
     path = Path(path)
-    if path.suffix.lower() != ".pc2":
-        raise ValueError(f"{path}: a point cache ends in .pc2")
     mesh = path.with_suffix(".obj")
     frames, points, _ = trajectory.positions.shape
     header = np.array((SIGNATURE, 1, points, 0.0, 1.0, frames), HEADER).tobytes()

@@ -61,9 +61,7 @@ class BendHinge(Energy):
         if scaling == "none":
             scale = np.ones(len(self.stencils))
         self.stiffness = cloth.material.bending_stiffness * scale
-        if isinstance(rest_angles, str):
-            if rest_angles != "rest":
-                raise ValueError(f"BendHinge rest_angles {rest_angles!r}: give an array, a number or 'rest'")
+        if isinstance(rest_angles, str) and rest_angles == "rest":
             rest_angles = dihedral_angles(cloth.rest_positions, self.stencils)
         angles = np.broadcast_to(np.asarray(rest_angles, dtype=np.float64), (len(self.stencils),))
         self.rest_angles = np.array(angles)  # its own: a broadcast view is read-only

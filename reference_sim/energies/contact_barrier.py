@@ -201,10 +201,8 @@ def _check_heights(cloth: Cloth, distance: float) -> None:
 
 
 def _load() -> ModuleType:
-    try:
-        import ipctk
-    except ImportError:
-        raise ImportError("a contact barrier needs the package ipctk: pip install ipctk") from None
+    import ipctk
+
     ipctk.set_logger_level(ipctk.error)  # its warnings go to standard output
     ipctk.set_num_threads(1)  # sums of several threads differ in the last digit from run to run
     return ipctk

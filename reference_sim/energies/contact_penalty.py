@@ -252,11 +252,9 @@ class ContactPenalty(Energy):
         self.samples = samples
         self.margin = float(margin)
         self.stencils, self.weights, self.sample_areas = _samples(cloth, samples)
-        self.stiffness = (
-            stiffness * self.sample_areas
-            if per_sample_stiffness is None
-            else np.full(len(self.stencils), float(per_sample_stiffness))
-        )
+        self.stiffness = stiffness * self.sample_areas
+        if per_sample_stiffness is not None:
+            self.stiffness = np.full(len(self.stencils), float(per_sample_stiffness))
         rows = np.repeat(np.arange(len(self.stencils)), 3)
         self.sample_matrix = sp.csr_matrix(
             (self.weights.ravel(), (rows, self.stencils.ravel())),

@@ -16,11 +16,6 @@ if TYPE_CHECKING:
     from reference_sim.kernels.fast_kernels import BatchKernel
 
 
-def vertex_weights(term: Gravity) -> np.ndarray:
-    """Return the weight (V,) [N] of each vertex, along -y."""
-    return term.weights
-
-
 def batch(term: Gravity) -> BatchKernel:
     """Return the kernel of training on a CPU."""
     weights = term.weights.astype(np.float32)
@@ -43,7 +38,7 @@ class Gravity(Energy):
 
     name = "gravity"
     constant = (3,)
-    kernels: ClassVar = {"vertex_weights": vertex_weights, "training_batch": batch}
+    kernels: ClassVar = {"vertex_weights": lambda term: term.weights, "training_batch": batch}
 
     def __init__(self, cloth: Cloth, origin_height: float = 0.0, *, acceleration: float = GRAVITY) -> None:
         self.cloth = cloth

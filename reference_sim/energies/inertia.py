@@ -17,17 +17,12 @@ if TYPE_CHECKING:
     from torch import Tensor
 
 
-def vertex_inertia(term: Inertia) -> np.ndarray:
-    """Return the stiffness (V,) [N/m] by which each vertex is pulled towards x_hat."""
-    return term.masses / term.dt**2
-
-
 class Inertia(Energy):
     """Incremental kinetic term [J] of each vertex; `prepare` (or the argument x_hat) sets the target."""
 
     name = "inertia"
     constant = (1, 3)
-    kernels: ClassVar = {"vertex_inertia": vertex_inertia}
+    kernels: ClassVar = {"vertex_inertia": lambda term: term.masses / term.dt**2}
 
     def __init__(self, cloth: Cloth, dt: float) -> None:
         demand_positive("Inertia", dt=dt)

@@ -94,10 +94,9 @@ def check_closed(positions: np.ndarray, faces: np.ndarray) -> None:
     >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
     >>> check_closed(corners[None], np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
     """
-    if positions.ndim != 3 or positions.shape[2] != 3 or faces.ndim != 2 or faces.shape[1] != 3:
+    moving = positions.ndim == 3 and positions.shape[2] == 3 and positions.size
+    if not (moving and faces.ndim == 2 and faces.shape[1] == 3 and faces.size):
         raise MeshError(f"obstacle {positions.shape} and faces {faces.shape}: expected (T, B, 3) and (F, 3)")
-    if not positions.size or not faces.size:
-        raise MeshError(f"obstacle with {len(positions)} frames and {len(faces)} faces: nothing to touch")
     if faces.min() < 0 or faces.max() >= positions.shape[1]:
         raise MeshError(f"obstacle faces name a vertex outside 0..{positions.shape[1] - 1}")
     if not np.isfinite(positions).all():

@@ -154,9 +154,8 @@ def to_blocks(values: np.ndarray) -> np.ndarray:
     count, width = values.shape
     padded = np.zeros((-(-count // LANES_FLOAT32) * LANES_FLOAT32, width), values.dtype)
     padded[:count] = values
-    return np.ascontiguousarray(padded.reshape(-1, LANES_FLOAT32, width).transpose(0, 2, 1)).reshape(
-        -1, width * LANES_FLOAT32
-    )
+    blocks = padded.reshape(-1, LANES_FLOAT32, width).transpose(0, 2, 1)
+    return np.ascontiguousarray(blocks).reshape(-1, width * LANES_FLOAT32)
 
 
 def lay_out(stencils: np.ndarray, *constants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -67,8 +67,8 @@ REFUSED = [
     ("zero area", moved(3, (1, 0, 0)), KITE_FACES, {}, "face 1 has no rest area"),
     ("three faces at an edge", FAN, THREE, {}, "edge (0, 1) has 3 faces [0, 1, 2]"),
     ("winding", KITE, np.array([(0, 1, 2), (0, 1, 3)]), {}, "faces 0 and 1 walk edge (0, 1) the same way"),
-    ("pin too high", KITE, KITE_FACES, {"pins": [1, 4]}, "pin 4 is no vertex"),
-    ("pins as a mask", KITE, KITE_FACES, {"pins": [True, False, False, True]}, "pins are bool"),
+    ("pin too high", KITE, KITE_FACES, {"pins": [1, 4]}, "pins 1 to 4: give indices from 0 to 3"),
+    ("pins as a mask", KITE, KITE_FACES, {"pins": [True, False]}, "pins False to True: give indices"),
     ("shape of uv", KITE, KITE_FACES, {"rest_uv": KITE}, "rest_uv has shape (4, 3)"),
     ("uv of zero area", KITE, KITE_FACES, {"rest_uv": FLAT_UV}, "face 1"),
 ]

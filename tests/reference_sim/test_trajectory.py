@@ -93,5 +93,3 @@ def test_point_cache_by_its_bytes(tmp_path):
     np.testing.assert_array_equal(surface.faces, FACES)
     np.testing.assert_allclose(surface.positions, trajectory.positions[0], atol=1e-9)
     assert sorted(p.name for p in tmp_path.iterdir()) == ["sheet.obj", "sheet.pc2"]
-    with pytest.raises(ValueError, match=r"ends in \.pc2"):
-        write_point_cache(tmp_path / "sheet.abc", trajectory)

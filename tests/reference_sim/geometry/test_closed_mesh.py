@@ -36,7 +36,7 @@ def test_closed_surfaces_pass():
     ("positions", "faces", "message"),
     [
         (BALL, FACES, r"expected \(T, B, 3\) and \(F, 3\)"),
-        (BALL[None][:0], FACES, "nothing to touch"),
+        (BALL[None][:0], FACES, r"obstacle \(0, 18, 3\)"),
         (BALL[None], FACES + 1, r"vertex outside 0\.\.17"),
         (with_vertex(1, 4, np.nan), FACES, "vertex 4 of frame 1 is not finite"),
         (with_vertex(2, FACES[5, 0], BALL[FACES[5, 1]]), FACES, "has no area in frame 2: remove it"),
