@@ -35,7 +35,6 @@ from reference_sim.kernels.lanes import LANES_FLOAT32 as L
 if TYPE_CHECKING:
     from reference_sim.energies.bend_hinge import BendHinge
 
-
 PI, TWO_PI = np.float32(np.pi), np.float32(2 * np.pi)
 # arctan(t) = t p(t^2) on [0, 1]; a Chebyshev fit, at most 4e-8 off.
 P0, P1, P2, P3, P4, P5, P6, P7 = (

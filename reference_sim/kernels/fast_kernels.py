@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from reference_sim.energies.inertia import Inertia
     from reference_sim.potential import Potential
 
-
 OF_VERTICES = ("vertex_inertia", "vertex_weights")
 
 

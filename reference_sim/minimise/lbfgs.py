@@ -36,7 +36,6 @@ from reference_sim.potential import Potential
 if TYPE_CHECKING:
     from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS
 
-
 SWITCH, COMPILED_SWITCH = 1.0, 0.1  # relative residuals at which Newton takes over
 PATIENCE = 100  # iterations after which it does in any case
 LARGEST_COMPILED = 10_000  # vertices: from about here on a package's factorisation is faster
@@ -55,8 +54,7 @@ class LBFGS:
         timeout: seconds, for both together.
 
     Raises:
-        ValueError: no term of the potential has a scalar stiffness, or a tolerance that is no finite number
-            above 0.
+        ValueError: a tolerance that is no finite number above 0.
     """
 
     def __init__(
@@ -80,8 +78,6 @@ class LBFGS:
             warn_slow_path("LBFGS", "float32 kernel", slow, instead)
             fast = False
         self.switch = max(COMPILED_SWITCH if fast else SWITCH, tolerance) if finish else tolerance
-        if not any(energy.has_scalar_stiffness for energy in potential.energies):
-            raise ValueError("LBFGS: no term of this potential has a scalar stiffness to precondition with")
         self._compiled: CompiledLBFGS | None = None
         if fast:  # its kernels are loaded only where they serve
             from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS

@@ -33,7 +33,6 @@ def test_a_wrong_word_is_one_line_with_the_name_of_the_command(
     ("met", "goes_on", "status", "message"),
     [
         (ValueError("a.obj: face 3\n has no area"), "", 2, "a.obj: face 3 has no area"),
-        (FileNotFoundError(errno.ENOENT, "No such file", "a.obj"), "", 2, "a.obj"),
         (OSError(errno.ENOSPC, "No space left", "a.csv"), "--resume goes on", 1, "kept; --resume goes on"),
         (KeyboardInterrupt(), "--resume goes on", 130, "interrupted; --resume goes on"),
         (KeyboardInterrupt(), "", 130, "interrupted; nothing was written"),

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from itertools import count
 from types import SimpleNamespace
 
 import numpy as np
@@ -141,15 +142,11 @@ def test_frames_of_sub_steps_are_every_nth_frame_of_small_steps_and_sum_their_wo
 
 
 def test_a_minimiser_that_cannot_start_again_is_made_anew_for_the_next_run():
-    class Learning:
-        def __init__(self, potential, **options):
-            self.steps, self.newton = 0, Newton(potential, max_iterations=1)
+    def learning(potential, **options):
+        steps, newton = count(1), Newton(potential, max_iterations=1)
+        return SimpleNamespace(minimise=lambda x0: newton.minimise(x0 + 1e-3 * next(steps)))
 
-        def minimise(self, x0):
-            self.steps += 1
-            return self.newton.minimise(x0 + 1e-3 * self.steps)
-
-    stepper = TimeStepper(FREE, [StretchStVK(FREE), Gravity(FREE)], method=Learning)
+    stepper = TimeStepper(FREE, [StretchStVK(FREE), Gravity(FREE)], method=learning)
     first = stepper.simulate(frames=4).positions
     assert not np.array_equal(stepper.simulate(frames=4).positions, first)
     stepper.start_again()

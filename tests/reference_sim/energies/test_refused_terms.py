@@ -8,14 +8,7 @@ import numpy as np
 import pytest
 
 from reference_sim import Cloth
-from reference_sim.energies import (
-    AreaBarrier,
-    ContactFriction,
-    ContactPenalty,
-    Energy,
-    Inertia,
-    StretchStVK,
-)
+from reference_sim.energies import AreaBarrier, ContactFriction, ContactPenalty, Energy, Inertia, StretchStVK
 from tests.reference_sim.meshes import grid
 
 SHEET = Cloth(*grid(3, 3, width=0.1, depth=0.1))
