@@ -254,7 +254,9 @@ def simulate(
     cloth: Cloth,
     energies: Sequence[Energy],
     *,
+    dt: float = 1 / 30,
     frames: int = 60,
+    obstacle: Obstacle | None = None,
     start: np.ndarray | None = None,
     velocity: np.ndarray | None = None,
     pin_positions: Callable[[int], np.ndarray] | None = None,
@@ -266,13 +268,15 @@ def simulate(
     Args:
         cloth: the rest state; its pins stay where `start` has them unless pin_positions moves them.
         energies: the terms of Phi. Inertia is added here; no other term is.
+        dt: time between frames [s].
         frames: number of frames T in the result.
+        obstacle: the moving body, one mesh per frame; terms of contact read it.
         start: (V, 3) [m] at frame 0; default the rest positions.
         velocity: (V, 3) [m/s] at frame 0; default zero.
         pin_positions: frame -> (P, 3) [m], for handles that move.
         progress: label of a progress bar with time left; None for silence.
-        options: of a `TimeStepper` and its minimiser: dt, by default 1/30 s, obstacle, guess, substeps,
-            quasi_static, refreeze, method, tolerance, max_iterations, timeout, ...
+        options: of a `time_loop.TimeStepper` and its minimiser: guess, substeps, quasi_static, refreeze,
+            method, tolerance, max_iterations, timeout, ...
 
     Returns:
         A Trajectory whose status is "converged" if every frame converged, else the worst of the others:
@@ -297,7 +301,7 @@ def simulate(
         >>> fall.positions[:, 1, 1].round(6).tolist()
         [0.0, -0.000981, -0.002943]
     """
-    return TimeStepper(cloth, energies, **options).simulate(
+    return TimeStepper(cloth, energies, dt=dt, obstacle=obstacle, **options).simulate(
         frames=frames, start=start, velocity=velocity, pin_positions=pin_positions, progress=progress
     )
 

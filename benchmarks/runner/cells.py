@@ -160,10 +160,10 @@ def build_scene(scene: Scene, context: Context) -> BuiltScene:
     run, assets = context.folder, context.assets
     if assets is None or not run.body_path(scene.name).is_file():
         return scene.build(assets)
-    from reference_sim.files.array_file import read_array
+    import numpy as np
 
-    bodies = {assets.motion(scene.motion, scene.part).name: read_array(run.body_path(scene.name))}
-    start = read_array(run.start_path(scene.name))
+    bodies = {assets.motion(scene.motion, scene.part).name: np.load(run.body_path(scene.name))}
+    start = np.load(run.start_path(scene.name))
     dressed = scene.build(replace(assets, bodies=bodies))
     return replace(dressed, settle=lambda: start)
 

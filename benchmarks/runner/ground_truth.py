@@ -29,7 +29,9 @@ def settle_start(scene: Scene, context: Context, needed: Needed) -> Outcome:
 
     Where a scene has `start_of`, its start is what settled in that scene.
     """
-    from reference_sim.files.array_file import read_array, write_array
+    import numpy as np
+
+    from reference_sim.files.array_file import write_array
 
     built, run, shared = scene.build(context.assets), context.folder, scene.start_of
     assert built.obstacle is not None
@@ -37,7 +39,7 @@ def settle_start(scene: Scene, context: Context, needed: Needed) -> Outcome:
         write_array(temporary, built.obstacle.positions)
     write_body(run, built)
     with replacing(run.start_path(scene.name)) as temporary:
-        write_array(temporary, read_array(run.start_path(shared)) if shared else built.start_state)
+        write_array(temporary, np.load(run.start_path(shared)) if shared else built.start_state)
     return Outcome(files=files_of_start(scene, run))
 
 

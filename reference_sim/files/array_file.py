@@ -21,25 +21,6 @@ class ArrayFileError(ValueError):
     """File that holds no plain arrays; the message names file and array."""
 
 
-def read_array(path: str | Path) -> np.ndarray:
-    """Read the array of an .npy file.
-
-    Raises:
-        ArrayFileError: as `read_arrays`.
-
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_array(f"{folder}/x.npy", np.arange(3.0))
-    ...     read_array(f"{folder}/x.npy")
-    array([0., 1., 2.])
-    """
-    path = Path(path)
-    try:
-        return _plain(np.load(path, allow_pickle=False))
-    except Exception as error:
-        raise refusal(path, "", error) from None
-
-
 def read_arrays(path: str | Path, names: Collection[str] | None = None) -> dict[str, np.ndarray]:
     """Read those of the named arrays that an .npz file holds, by default all; others are not touched.
 
@@ -73,6 +54,8 @@ def write_array(path: str | Path, array: np.ndarray) -> None:
     >>> import tempfile
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     write_array(f"{folder}/x.npy", np.zeros(2))
+    ...     np.load(f"{folder}/x.npy")
+    array([0., 0.])
     """
     array = np.asarray(array, order="C")  # ascontiguousarray would make a number an array of one
     with open(path, "wb") as stream:
