@@ -9,7 +9,6 @@ solves and line search are one compiled function, of which the kernels of the te
 
 from __future__ import annotations
 
-import time
 from collections import namedtuple
 from typing import Any
 
@@ -218,29 +217,24 @@ class CompiledLBFGS:
 
     def minimise(self, x0: np.ndarray) -> Result:
         """Run from x0 (V, 3) [m]: status "max_iterations", "stalled" or "diverged"."""
-        start = time.perf_counter()
         x0 = np.ascontiguousarray(x0, np.float64)
         target = (self._terms.inertia.x_hat - x0).astype(np.float32).ravel()
         terms = self.freeze(x0)
         stiffening = tuple((kernel, (*terms[k][1], places)) for k, kernel, places in self._stiffening)
         self._energies[:], self._counts[:] = np.nan, 0.0  # nothing of the step before is reported
         u = np.zeros(x0.size, np.float32)
-        middle = time.perf_counter()
         if not precondition(stiffening, self._factor):
-            return self._result(x0, "stalled", "the preconditioner is not positive definite", {}, np.nan)
-        begun = time.perf_counter()
+            return self._result(x0, "stalled", "the preconditioner is not positive definite", np.nan)
         residual = descend(
             u, target, self._vertices, terms, self._factor, self._memory, self.max_iterations,
             self._tolerance, min(2.0 * self._first_step, 1.0), self._work, self._scratch, self._energies,
             self._counts,
         )  # fmt: skip
         self._first_step = float(self._counts[1])
-        seconds = {"assemble": middle - start, "factorise": begun - middle}
-        seconds["descend"] = time.perf_counter() - begun
         x = x0 + u.reshape(x0.shape)
         if not np.isfinite(self._energies.sum()):
-            return self._result(x, "diverged", "the energy is not finite", seconds, residual)
-        return self._result(x, "max_iterations", self._reason(residual), seconds, residual)
+            return self._result(x, "diverged", "the energy is not finite", residual)
+        return self._result(x, "max_iterations", self._reason(residual), residual)
 
     def freeze(self, x0: np.ndarray) -> tuple[tuple[np.ndarray, tuple[Any, ...]], ...]:
         """Return kernel and data of each term of elements for a step from x0 (V, 3) [m]."""
@@ -255,9 +249,7 @@ class CompiledLBFGS:
             return f"no step along the quasi-Newton direction lowers the energy, after {count} iterations"
         return f"stopped after {count} iterations"
 
-    def _result(
-        self, x: np.ndarray, status: str, reason: str, seconds: dict[str, float], residual: float
-    ) -> Result:
+    def _result(self, x: np.ndarray, status: str, reason: str, residual: float) -> Result:
         inertia, _, *elements = self._energies.tolist()
         values = {self._terms.inertia.name: inertia}
         values |= {term.name: term.value_and_gradient(x)[0] for term in self._terms.weighing}
@@ -272,7 +264,6 @@ class CompiledLBFGS:
             gradient_norm=float(residual) / self._weight,
             energy=sum(terms.values()),
             terms=terms,
-            seconds=seconds,
         )
 
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Any, TypeVar
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -119,8 +119,6 @@ class Result:
             component of dPhi/dx over the free vertices, divided by the mean weight of a vertex.
         energy: value at positions [J].
         terms: energy of each term [J].
-        seconds: time by part: assemble, factorise, solve, evaluate; descend is a whole compiled descent,
-            evaluations and solves with the preconditioner included.
     """
 
     positions: np.ndarray
@@ -131,7 +129,6 @@ class Result:
     gradient_norm: float
     energy: float
     terms: dict[str, float]
-    seconds: dict[str, float] = field(default_factory=dict)
     relaxed: bool = False
 
 
@@ -144,8 +141,6 @@ def check_tolerance(tolerance: float) -> None:
 SUFFICIENT_DECREASE = 1e-4
 STEP_HALVINGS = 24  # of a step before its direction is given up
 
-Value = TypeVar("Value")
-
 
 class Descent:
     """State of one minimisation over the free vertices of a cloth.
@@ -157,7 +152,6 @@ class Descent:
     Attributes:
         x: (V, 3), the point kept last; value [J] and g (3n,) [N] belong to it.
         iterations, factorisations: counts.
-        seconds: time by part.
         started: clock [s] at the beginning.
     """
 
@@ -168,8 +162,6 @@ class Descent:
         self.weight = mean_weight(potential)
         self.iterations: int = after.iterations if after else 0
         self.factorisations: int = after.factorisations if after else 0
-        parts = dict.fromkeys(("assemble", "factorise", "solve", "evaluate"), 0.0)
-        self.seconds: dict[str, float] = dict(after.seconds) if after else parts
         self.started: float = after.started if after else time.perf_counter()
         self.value: float
         self.g: np.ndarray
@@ -188,17 +180,10 @@ class Descent:
         unknown = Stop("diverged", "energy or gradient is not finite at the starting point")
         return None if self.finite else unknown
 
-    def timed(self, part: str, function: Callable[..., Value], *arguments: object) -> Value:
-        """Return function(*arguments), and add its seconds to those of `part`."""
-        start = time.perf_counter()
-        value = function(*arguments)
-        self.seconds[part] += time.perf_counter() - start
-        return value
-
     def evaluate(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the value [J] and the gradient over the free vertices, flat (3n,) [N], at x (V, 3) [m]."""
         with np.errstate(all="ignore"):  # a trial point far off is refused by its value, not by a warning
-            value, gradient = self.timed("evaluate", self.potential.value_and_gradient, x)
+            value, gradient = self.potential.value_and_gradient(x)
         return value, gradient[self.free].ravel()
 
     def spread(self, p: np.ndarray) -> np.ndarray:
@@ -248,11 +233,9 @@ class Descent:
         return float(np.abs(self.g).max(initial=0.0)) / self.weight
 
     def add_costs(self, other: Descent | Result) -> None:
-        """Add the counts and the time by part of another minimisation of the same step."""
+        """Add the counts of another minimisation of the same step."""
         self.iterations += other.iterations
         self.factorisations += other.factorisations
-        for part, seconds in other.seconds.items():
-            self.seconds[part] = self.seconds.get(part, 0.0) + seconds
 
     def late(self, timeout: float) -> bool:
         """Return whether more than `timeout` seconds have passed since the start."""
@@ -270,7 +253,6 @@ class Descent:
             gradient_norm=self.gradient_norm(),
             energy=self.value,
             terms=self.potential.terms(self.x),
-            seconds=self.seconds,
         )
 
 

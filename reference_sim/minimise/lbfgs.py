@@ -163,15 +163,14 @@ class LBFGSRun(Descent):
         """Factorise the preconditioner at the start, once for all steps."""
         if stop := super().begin():
             return stop
-        values = self.timed("assemble", self.preconditioner.assemble, self.x)
         self.factorisations += 1
-        if self.timed("factorise", self.preconditioner.solver.factorise, values):
+        if self.preconditioner.solver.factorise(self.preconditioner.assemble(self.x)):
             return None
         return Stop("stalled", "the preconditioner is not positive definite")
 
     def solve(self, q: np.ndarray) -> np.ndarray:
         """Return the inverse of the preconditioner times q (3n,)."""
-        return self.timed("solve", self.preconditioner.solver.solve, q.reshape(-1, 3)).ravel()
+        return self.preconditioner.solver.solve(q.reshape(-1, 3)).ravel()
 
 
 # In units of M/dt^2 at 30 steps a second. Cloth that nothing holds needs it against its rigid motions alone;

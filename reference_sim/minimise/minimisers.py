@@ -137,7 +137,7 @@ class StepMinimiser:
     def minimise(self, x: np.ndarray, guess: np.ndarray) -> Result:
         """Minimise the step that starts at x (V, 3) [m], from `guess` (V, 3) [m] or from as near as x comes.
 
-        Counts and seconds of the result are those of all its minimisations together.
+        Counts of the result are those of all its minimisations together.
         """
         if not self._opening or not np.isfinite(guess).all():
             return self.minimise_from(guess)  # which reports a divergence
@@ -215,14 +215,9 @@ class StepMinimiser:
 
 
 def _after(*results: Result) -> Result:
-    """Return the last result with the counts and seconds of all."""
-    seconds: dict[str, float] = {}
-    for result in results:
-        for part, spent in result.seconds.items():
-            seconds[part] = seconds.get(part, 0.0) + spent
+    """Return the last result with the counts of all."""
     return replace(
         results[-1],
         iterations=sum(result.iterations for result in results),
         factorisations=sum(result.factorisations for result in results),
-        seconds=seconds,
     )

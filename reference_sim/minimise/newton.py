@@ -177,17 +177,17 @@ class NewtonRun(Descent):
     def assemble(self, convexity: float) -> np.ndarray:
         """Return values (nnz,) of the Hessian at the point kept last."""
         with np.errstate(all="ignore"):
-            return self.timed("assemble", self.hessian.assemble, self.x, convexity)
+            return self.hessian.assemble(self.x, convexity)
 
     def factorise(self, values: np.ndarray, shift: float | np.ndarray) -> bool:
         """Factorise, as the Hessian does, and count it; False if not positive definite."""
-        self.factorised = self.timed("factorise", self.hessian.factorise, values, shift)
+        self.factorised = self.hessian.factorise(values, shift)
         self.factorisations += 1
         return self.factorised
 
     def solve(self, b: np.ndarray) -> np.ndarray:
         """Solve with the last factorisation, as the Hessian does."""
-        return self.timed("solve", self.hessian.solve, b)
+        return self.hessian.solve(b)
 
     def first_projection(self) -> int:
         """Return the level to begin with: wrinkled cloth stays near that of the last step for a while."""

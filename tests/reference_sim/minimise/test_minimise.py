@@ -23,7 +23,7 @@ def test_a_sheet_hangs_from_two_corners(method):
     # The two pins carry the whole weight, minus what the lumped masses of the pins carry themselves.
     carried = gradient_by_torch(potential, result.positions)[potential.cloth.pins]
     assert carried.sum(axis=0) == pytest.approx([0, potential.cloth.masses.sum() * GRAVITY, 0], abs=1e-6)
-    assert result.iterations > 0 and result.factorisations > 0 and min(result.seconds.values()) >= 0
+    assert result.iterations > 0 and result.factorisations > 0
 
 
 @pytest.mark.parametrize("term", [BendHinge, StretchSpring])
