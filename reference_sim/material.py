@@ -10,10 +10,6 @@ from pathlib import Path
 GRAVITY = 9.81  # [m/s^2], downwards along -y
 
 
-class MaterialError(ValueError):
-    """File that holds no material; the message names the file."""
-
-
 @dataclass(frozen=True)
 class Material:
     """Isotropic fabric. Defaults are the cotton of the SNUG paper.
@@ -66,7 +62,7 @@ class Material:
         Fields that are left out keep their defaults.
 
         Raises:
-            MaterialError: no such file, not understood, an unknown or missing field, or a value out of its
+            ValueError: no such file, not understood, an unknown or missing field, or a value out of its
                 range; the message names the file.
         """
         try:
@@ -74,10 +70,10 @@ class Material:
             make = cls.from_lame if "lame_mu_pa" in values else cls
             return make(**values)
         except FileNotFoundError:
-            raise MaterialError(f"{path}: no such file") from None
+            raise ValueError(f"{path}: no such file") from None
         except (ValueError, TypeError, OverflowError, RecursionError) as error:  # also of text that is none
             reason = " ".join(str(error).split())
-            raise MaterialError(f"{path}: {reason}; give fields of Material in SI units") from None
+            raise ValueError(f"{path}: {reason}; give fields of Material in SI units") from None
 
     @classmethod
     def from_lame(

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from reference_sim.cloth import Cloth, MeshError
+from reference_sim.cloth import Cloth
 from reference_sim.files.mesh_files import (
     METRES,
     UP_AXES,
@@ -19,7 +19,7 @@ from reference_sim.files.mesh_files import (
     rest_chart,
     to_metres_y_up,
 )
-from reference_sim.material import Material, MaterialError
+from reference_sim.material import Material
 from reference_sim.obstacle import Obstacle
 from snug.body.parametric_body import Body
 from snug.file_options import GarmentFile
@@ -73,7 +73,7 @@ def read_garment(file: GarmentFile | str | Path, body: Body) -> Garment:
     try:
         raw = read_mesh(file.path)
         material = Material.from_file(file.material) if file.material else Material()
-    except (MeshError, MaterialError) as error:
+    except ValueError as error:
         raise GarmentError(str(error)) from None
     try:
         return _make_garment(file, body, raw, material)
