@@ -157,11 +157,6 @@ class ScalarPattern:
             columns.astype(np.uint32) for columns in (self.row_columns, self.factor_columns, self.rows)
         )
 
-    @property
-    def entries(self) -> int:
-        """Number of entries of the matrix as stored: left of the diagonal, then the diagonal."""
-        return len(self.row_columns) + self.count
-
     def places(self, stencils: np.ndarray) -> np.ndarray:
         """Return where (E, k, k) the entries of the elements' matrices are added.
 

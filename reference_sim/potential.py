@@ -112,11 +112,6 @@ class HessianPattern:
         order = np.argsort(key)
         return key[order], blocks.data[stored[order]]
 
-    @property
-    def size(self) -> int:
-        """Number of rows, block n."""
-        return self.block * len(self.free)
-
     @cached_property
     def order(self) -> np.ndarray:
         """(block n,) fill-reducing order of rows and columns."""
@@ -165,8 +160,8 @@ class HessianPattern:
 
     def symmetric(self, values: np.ndarray) -> sp.csc_matrix:
         """Return the whole symmetric (3n, 3n) matrix."""
-        shape = self.size, self.size  # the upper halves of its diagonal blocks are stored too
-        lower = sp.tril(sp.csc_matrix((values, self.indices, self.indptr), shape=shape), format="csc")
+        # The upper halves of its diagonal blocks are stored too.
+        lower = sp.tril(sp.csc_matrix((values, self.indices, self.indptr)), format="csc")
         return sp.csc_matrix(lower + sp.tril(lower, -1).T)
 
 

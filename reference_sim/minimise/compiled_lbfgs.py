@@ -279,7 +279,7 @@ def _factor(free: np.ndarray, rest: np.ndarray, terms: StepTerms) -> tuple[Any, 
     changing = [(k, lanes) for k, lanes in enumerate(terms.kernels) if lanes.stiffness is not None]
     stencils = [number[e.stencils] for e in fixed] + [number[lanes.stencils] for _, lanes in changing]
     pattern = ScalarPattern(int(free.sum()), stencils)
-    constant = np.zeros(pattern.entries)
+    constant = np.zeros(len(pattern.row_columns) + pattern.count)  # left of the diagonal, then the diagonal
     for energy in fixed:
         elements, values = energy.scalar_stiffness(rest)
         places = pattern.places(number[energy.stencils[elements]])

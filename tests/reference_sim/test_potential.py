@@ -49,15 +49,15 @@ def test_the_pattern_of_free_vertices_is_a_part_of_the_whole(pins):
     pattern, rows = potential.pattern(cloth.free), np.repeat(cloth.free, 3)
     expected = dense_sum(energies, x)[np.ix_(rows, rows)]
     data = pattern.assemble(x)
-    assert pattern.size == rows.sum()
+    assert len(pattern.indptr) == rows.sum() + 1
     # Sums of the same numbers in another order, after autodiff's own round-off.
     assert np.abs(pattern.symmetric(data).toarray() - expected).max() < 1e-12 * np.abs(expected).max()
     if not pins:
         assert (potential.hessian(x) != pattern.symmetric(data)).nnz == 0
     assert data[pattern.diagonal] == pytest.approx(expected.diagonal(), rel=1e-12)
-    assert sorted(pattern.order.tolist()) == list(range(pattern.size))
+    assert sorted(pattern.order.tolist()) == list(range(rows.sum()))
     # CSC as a factorisation reads it: rows of a column in order, the diagonal stored.
-    for column in range(pattern.size):
+    for column in range(rows.sum()):
         stored = pattern.indices[pattern.indptr[column] : pattern.indptr[column + 1]]
         assert (np.diff(stored) > 0).all() and column in stored
 
