@@ -6,7 +6,6 @@ at a distance r from the base that was h at rest, with E(r) = A (lambda/2 + mu) 
 
 from __future__ import annotations
 
-from functools import partial
 from itertools import pairwise
 from typing import Any
 
