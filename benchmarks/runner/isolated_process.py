@@ -30,6 +30,7 @@ if TYPE_CHECKING:
 
     from benchmarks.assets import Assets
 
+PATIENCE = 2.0  # [s] for an idle process to clean up behind itself: semaphores, as of progress bars
 COMPILING = 900.0  # [s] for what a process does before its first task: it may have to compile every kernel
 # What every process loads. Nothing that a scene may do without: not torch, not what a body is asked with.
 LOADED_BY_ALL = ("h5py", "numba", "scipy.sparse.linalg", "reference_sim", "benchmarks.runner.cells")
@@ -99,10 +100,10 @@ class TaskProcess:
         except (EOFError, ConnectionError):
             self._process.join()
             code = self._process.exitcode
-            self.close()
+            self._kill()
             raise WorkerDied(*how_it_ended(code)) from None
         except BaseException:
-            self.close()
+            self._kill()
             raise
         if isinstance(answer, RunStopped):
             raise answer
@@ -122,7 +123,13 @@ class TaskProcess:
             process.kill()
 
     def close(self) -> None:
-        """End it and what it has started."""
+        """Let it end by itself, for it has nothing to do; then end all that it has started."""
+        if self._process is not None:
+            self._pipe.close()
+            self._process.join(PATIENCE)
+            self._kill()
+
+    def _kill(self) -> None:
         if self._process is not None:
             self.stop()
             self._process.join()

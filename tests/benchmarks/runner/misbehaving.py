@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import signal
-import subprocess
 import sys
 import threading
 import time
@@ -16,9 +14,6 @@ import numpy as np
 from benchmarks.method import Method
 from benchmarks.runner.task import Outcome
 from reference_sim.trajectory import Trajectory
-
-# No other test starts a process by this text, so that the test which looks for it finds its own alone.
-HANGING_CHILD = "import time; time.sleep(61.5)"
 
 
 class Misbehaving(Method):
@@ -73,20 +68,8 @@ class Misbehaving(Method):
             return Trajectory(still, self.scene.cloth.faces, np.arange(len(still)) * self.scene.dt)
         return None
 
-    def _hang(self, _) -> None:
-        subprocess.Popen([sys.executable, "-c", HANGING_CHILD])
-        while True:
-            time.sleep(0.05)
-
-    def _segfault(self, _) -> None:
-        signal.signal(signal.SIGSEGV, signal.SIG_DFL)
-        ctypes.string_at(0)
-
     def _killed(self, _) -> None:
         os.kill(os.getpid(), signal.SIGKILL)
-
-    def _hungry(self, _) -> None:
-        raise MemoryError("no room")
 
     def _early(self, positions) -> None:
         """Comes back at once and goes on working in a thread."""

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import os
-import time
-from pathlib import Path
 
 import pytest
 
@@ -18,7 +15,6 @@ from benchmarks.runner.loop import Runner
 from benchmarks.runner.rows import clock_costs, rows_of
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.runner.task import Outcome
-from tests.benchmarks.runner.misbehaving import HANGING_CHILD
 from tests.benchmarks.runner.tasks_by_hand import TINY, InProcess, finish, outcome_of, plan_of
 
 
@@ -38,48 +34,24 @@ def rows(runner: Runner, plan: Plan) -> dict[str, Row]:
 
 
 @pytest.mark.parametrize(
-    ("how", "status", "word"),
+    ("how", "word"),
     [
-        ("raise", "failed", "RuntimeError: broken on purpose"),
-        ("segfault", "failed", "SIGSEGV"),
-        ("killed", "out-of-memory", "SIGKILL"),
-        ("hungry", "out-of-memory", "no room"),
-        ("early", "failed", "its time cannot be believed"),
-        ("unheld", "failed", "OSError: no room left"),
-        ("late", "failed", "run() gives positions float64 (5, 16, 3): floats (4, 16, 3) are due"),
-        ("narrow", "failed", "run() gives positions float64 (4, 15, 3): floats (4, 16, 3) are due"),
-        ("astray", "failed", "quasi_static() gives positions float64 (4, 2, 3)"),
-        pytest.param("hang", "timeout", "no answer within 4 s", marks=pytest.mark.slow),
+        ("raise", "RuntimeError: broken on purpose"),
+        ("early", "its time cannot be believed"),
+        ("unheld", "OSError: no room left"),
+        ("late", "run() gives positions float64 (5, 16, 3): floats (4, 16, 3) are due"),
+        ("narrow", "run() gives positions float64 (4, 15, 3): floats (4, 16, 3) are due"),
+        ("astray", "quasi_static() gives positions float64 (4, 2, 3)"),
     ],
 )
-def test_a_cell_that_goes_wrong_is_an_outcome_with_its_reason(how, status, word, tmp_path):
+def test_a_cell_that_goes_wrong_is_an_outcome_with_its_reason(how, word, tmp_path):
     plan = plan_of(tmp_path, "newton-1", how=how)
-    if how == "hang":
-        plan = dataclasses.replace(plan, preset=dataclasses.replace(TINY, cell_seconds=4.0))
-    runner = finish(plan, "cells", "metrics", processes=True)  # other threads of the tests falsify its times
+    runner = finish(plan, "cells", "metrics", processes=how == "early")  # threads of tests falsify times
     outcome = runner.outcomes["cell", plan.cells[0].name]
-    assert outcome.status == status and word in outcome.reason and outcome.failed and not outcome.files
+    assert word in outcome.reason and outcome.failed and not outcome.files
     (row,) = rows(runner, plan).values()
-    assert (row.status, row.value) == (status, None) and not list(tmp_path.rglob("*.vtkhdf"))
+    assert (row.status, row.value) == ("failed", None) and not list(tmp_path.rglob("*.vtkhdf"))
     assert why(plan) == outcome.ending
-    deadline = time.monotonic() + 5.0  # what was killed with the process may take a moment to go
-    while of_session(os.getsid(0), HANGING_CHILD):
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
-
-
-def of_session(session: int, word: str = "") -> list[int]:
-    """Processes of a session that have this word in their command line and are no zombies."""
-    processes = []
-    for path in Path("/proc").glob("[0-9]*"):
-        try:
-            state, _, _, its_session = (path / "stat").read_text().rpartition(")")[2].split()[:4]
-            line = (path / "cmdline").read_text()
-        except OSError:
-            continue  # it has just ended
-        if int(its_session) == session and state != "Z" and word in line:
-            processes.append(int(path.name))
-    return processes
 
 
 @pytest.mark.slow

@@ -21,7 +21,6 @@ from benchmarks.runner.run_json import RunLog
 from benchmarks.validation.case import Case
 from benchmarks.validation.registry import KNOWN_ANSWERS
 from tests.benchmarks.runner.tasks_by_hand import InProcess, finish, plan_of, run_in_this_process
-from tests.benchmarks.runner.test_cells import of_session
 from tests.benchmarks.runner.test_tasks import task
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -44,6 +43,19 @@ def start(program: list[str]) -> subprocess.Popen:
         [sys.executable, *program], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
         env=os.environ | {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"}, start_new_session=True,
     )  # fmt: skip
+
+
+def of_session(session: int) -> list[int]:
+    """Processes of a session that are no zombies."""
+    processes = []
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            state, _, _, its_session = (path / "stat").read_text().rpartition(")")[2].split()[:4]
+        except OSError:
+            continue  # it has just ended
+        if int(its_session) == session and state != "Z":
+            processes.append(int(path.name))
+    return processes
 
 
 def kill(process: subprocess.Popen) -> None:
