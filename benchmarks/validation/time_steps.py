@@ -6,6 +6,7 @@ at a distance r from the base that was h at rest, with E(r) = A (lambda/2 + mu) 
 
 from __future__ import annotations
 
+from functools import partial
 from itertools import pairwise
 from typing import Any
 
@@ -131,11 +132,7 @@ def pressed_time_step_order() -> float:
         cloth, terms, dt=1.0, frames=9, quasi_static=True, start=tent, obstacle=still, guess="previous"
     ).positions[-1]
     steps = (30, 60, 120, 240)
-    ends = [
-        motion(cloth, terms, dt=end / n, frames=n + 1, start=start, obstacle=ball(n), guess="extrapolated")[
-            -1
-        ]
-        for n in steps
-    ]
+    run = partial(motion, cloth, terms, start=start, guess="extrapolated")
+    ends = [run(dt=end / n, frames=n + 1, obstacle=ball(n))[-1] for n in steps]
     distances = [np.sqrt(((a - b) ** 2).sum(axis=1).mean()) for a, b in pairwise(ends)]
     return fitted_order(distances, [1 / n for n in steps[:-1]])
