@@ -96,10 +96,9 @@ def a_scene(dynamic=1.0):
     origins = np.stack([0 * time, 0.9 + 0 * time, 1.2 * time], axis=1)
     axes = about_y(yaw)
     after = TIME - 60 * DT
-    ringing_yaw = 0.2 * np.exp(-np.maximum(after, 0) / 0.3) * np.cos(2 * np.pi * 1.5 * after) * (after >= 0)
+    ringing_yaw = 0.2 * np.exp(-np.maximum(after, 0) / 0.3) * np.cos(2 * np.pi * 1.5 * after)
     lag = dynamic * np.where(after < 0, -0.3 * np.cos(2 * np.pi * TIME), ringing_yaw)
-    world = ring(yaw + lag) + origins[:, None]
-    quiet = ring(yaw) + origins[:, None]
+    world, quiet = (ring(turn) + origins[:, None] for turn in (yaw + lag, yaw))
     return axes, origins, world, quiet
 
 

@@ -51,10 +51,8 @@ def test_a_loop_comes_back_to_its_pose_and_goes_on_over_the_ground():
         assert np.array_equal(motion.poses[frames], motion.poses[:loop])
     assert late[-1] < 1000 <= late[-1] + loop
     assert motion.translations[loop, 1] == pytest.approx(motion.translations[0, 1], abs=1e-12)
-    step = np.linalg.norm(np.diff(motion.translations, axis=0), axis=1)
-    assert step.max() == pytest.approx(
-        np.linalg.norm(np.diff(walk.translations, axis=0), axis=1).max(), rel=0.2
-    )
+    steps = [np.linalg.norm(np.diff(m.translations, axis=0), axis=1).max() for m in (motion, walk)]
+    assert steps[0] == pytest.approx(steps[1], rel=0.2)
     with pytest.raises(ValueError, match="a drift needs three loops, 390 frames, not 389"):
         hard_motions.looped(walk, 389)
 
