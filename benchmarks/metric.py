@@ -139,7 +139,8 @@ def measurements_in(home: str) -> Measurements:
     """Return what a user's file measures."""
     module = load(home)
     names = ("measure", "compare", "series", "judge")
-    return Measurements(home, tuple(module.METRICS), *(getattr(module, name, None) for name in names))
+    functions: Any = {name: getattr(module, name, None) for name in names}
+    return Measurements(home, tuple(module.METRICS), **functions)
 
 
 @dataclass(eq=False)
