@@ -9,8 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from benchmarks.method import MethodEntry, Reporting
-from benchmarks.training import Simulated, Training
+from benchmarks.method import MethodEntry, Reporting, Simulated, Training
 from snug.kinds import KINDS
 from snug.named_recipes import ABLATIONS, PAPER, PBNS_SPRINGS
 

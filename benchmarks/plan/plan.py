@@ -12,7 +12,7 @@ from typing import Any
 from benchmarks.assets import Assets, Inputs, embedded_motions, open_assets, read_inputs
 from benchmarks.declarations import by_name
 from benchmarks.external.roll_out_files import MODULE as STORED
-from benchmarks.method import installed
+from benchmarks.method import Training, installed
 from benchmarks.methods import METHODS, find_method
 from benchmarks.methods.declared_networks import TRAININGS
 from benchmarks.metrics import declared
@@ -28,7 +28,6 @@ from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.scene import Scene
 from benchmarks.scenes import GarmentScenes, all_scenes
-from benchmarks.training import Training
 from benchmarks.validation.case import Case
 from benchmarks.validation.registry import CASES
 from reference_sim.files.atomic_files import demand_writable_folder

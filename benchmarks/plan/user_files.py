@@ -14,14 +14,13 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from benchmarks.declarations import DeclarationError, by_name, demand_that_it_is, load, raised_at
-from benchmarks.method import MethodEntry
+from benchmarks.method import MethodEntry, Training
 from benchmarks.methods.declared_networks import TRAININGS
 from benchmarks.metric import Metric
 from benchmarks.metrics import MEASUREMENTS
 from benchmarks.plan.study import Part, Study
 from benchmarks.provenance import digest, find_module, imported_beside
 from benchmarks.scene import Scene
-from benchmarks.training import Training
 from benchmarks.validation.case import Case, cases_of
 
 NAME = re.compile(r"(?!body$|.*quasi-static$)[A-Za-z0-9_][A-Za-z0-9_+./@:-]{0,149}")  # it names files

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from benchmarks import provenance
-from benchmarks.method import MethodEntry
+from benchmarks.method import MethodEntry, Simulated
 from benchmarks.methods import find_method
 from benchmarks.metric import COMPARED_WITH
 from benchmarks.plan.cell import Cell, TaskId, flat
@@ -35,7 +35,6 @@ from benchmarks.runner.networks import LONGEST, NetworkTraining, pretrained_netw
 from benchmarks.runner.task import Outcome, Task
 from benchmarks.scene import Scene
 from benchmarks.scenes import find_scene, of_garment
-from benchmarks.training import Simulated
 
 if TYPE_CHECKING:
     from benchmarks.validation.case import Case

@@ -36,7 +36,7 @@ from pathlib import Path
 from benchmarks.methods.declared_networks import network
 from benchmarks.presets import find_preset
 from benchmarks.runner import networks as training
-from benchmarks.training import Training
+from benchmarks.method import Training
 from snug.recipe import DEFAULT
 
 find_preset("smoke").steps["snug"] = {steps}

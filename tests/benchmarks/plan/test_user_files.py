@@ -12,7 +12,7 @@ import pytest
 
 from benchmarks import metric, run
 from benchmarks.declarations import DeclarationError
-from benchmarks.method import MethodEntry
+from benchmarks.method import MethodEntry, Training
 from benchmarks.methods import METHODS
 from benchmarks.methods.outside import program
 from benchmarks.plan import user_files
@@ -22,7 +22,6 @@ from benchmarks.plan.plan import Plan
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.measurements import measured
 from benchmarks.runner.schedule import Schedule
-from benchmarks.training import Training
 from benchmarks.validation.registry import CASES
 from reference_sim import Trajectory
 from snug.recipe import DEFAULT, RecipeError

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks import export
+from benchmarks.method import Simulated
 from benchmarks.methods import METHODS, find_method
 from benchmarks.methods.declared_networks import TRAININGS
 from benchmarks.plan.cell import Cell
@@ -18,7 +19,6 @@ from benchmarks.runner import ground_truth, training_motions
 from benchmarks.runner.ground_truth import simulate_clips
 from benchmarks.runner.networks import LONGEST, train
 from benchmarks.runner.schedule import Schedule, tasks_of
-from benchmarks.training import Simulated
 from reference_sim import Trajectory, simulate
 from reference_sim.files.array_file import read_arrays
 from snug.motion.library import TRAIN

@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 import torch
 
+from benchmarks.method import Training
 from benchmarks.methods import find_method
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
@@ -21,7 +22,6 @@ from benchmarks.runner.rows import rows_of
 from benchmarks.runner.run_json import described
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.runner.task import Outcome
-from benchmarks.training import Training
 from snug.named_recipes import PBNS
 from snug.networks.trained_model import TrainedModel
 from tests.benchmarks.runner.tasks_by_hand import TINY, assets_of, context, dressed_scene, plan_of
