@@ -7,13 +7,13 @@ A new figure is a function in a file of its own and a line here.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from textwrap import shorten
 
+import pandas as pd
+
 from reports.figures.charts import (
-    break_even,
     dots,
     energy_series,
     error_of_page_one,
@@ -21,9 +21,10 @@ from reports.figures.charts import (
 from reports.figures.figure import Figure, Picture
 from reports.finished_run import Run
 from reports.pictures import failures, side_by_side
-from reports.tables.table import Cell, Table
+from reports.tables.table import Table
 
-ROWS, LETTERS = 12, 90  # of a printed table, and of a reason at the end of its rows; the CSV has all
+ROWS, COLUMNS = 12, 9  # of a printed table; columns of numbers; the CSV has all
+LETTERS = 90  # of a reason at the end of its rows
 
 
 @dataclass(frozen=True)
@@ -61,23 +62,26 @@ class TableBlock:
     left_out: tuple[str, ...] = ()
 
     def printed(self, table: Table) -> Table:
-        """Return the first rows of each group, equally many; a note says where the others are."""
+        """Return the first columns, and of rows the first of each group; a note says where the others are."""
         rows = [row for row in table.rows if not set(row) & set(self.left_out)]
         heads = [place for place, column in enumerate(table.columns) if column.name in table.grouped_by]
-        before: Counter[tuple[Cell, ...]] = Counter()
-        order = []
-        for line, row in enumerate(rows):
-            group = tuple(row[place] for place in heads)
-            order.append((before[group], line))
-            before[group] += 1
-        chosen = sorted(line for _, line in sorted(order)[: self.most])
-        more = len(table.rows) - len(chosen)
-        rest = f"{more} more rows are in tables/{table.name}.csv. " if more else ""
+        groups = pd.Series([" · ".join(str(row[place]) for place in heads) for row in rows], dtype=str)
+        order = groups.groupby(groups).cumcount().sort_values(kind="stable")
+        rows = [rows[line] for line in sorted(order.index[: self.most])]
+        numbers = [place for place, column in enumerate(table.columns) if not column.text]
+        places = [place for place in range(len(table.columns)) if place not in numbers[COLUMNS:]]
+        counts = {"rows": len(table.rows) - len(rows), "columns": len(table.columns) - len(places)}
+        more = " and ".join(f"{count} more {what}" for what, count in counts.items() if count)
+        rest = f"{more} are in tables/{table.name}.csv. " if more else ""
         reason = next((k for k, column in enumerate(table.columns) if column.name == "reason"), None)
-        kept = (rows[line] for line in chosen)
         if reason is not None:
-            kept = ((*row[:reason], shorten(str(row[reason]), LETTERS, placeholder="…")) for row in kept)
-        return replace(table, rows=tuple(kept), note=(rest + table.note).strip())
+            rows = [(*row[:reason], shorten(str(row[reason]), LETTERS, placeholder="…")) for row in rows]
+        return replace(
+            table,
+            columns=tuple(table.columns[place] for place in places),
+            rows=tuple(tuple(row[place] for place in places) for row in rows),
+            note=(rest + table.note).strip(),
+        )
 
 
 BLOCKS: tuple[Heading | Figure | TableBlock, ...] = (
@@ -97,7 +101,6 @@ BLOCKS: tuple[Heading | Figure | TableBlock, ...] = (
     TableBlock("ablation_effects"),
     Heading("Error against run time"),
     TableBlock("error_rivals"),
-    Figure("break_even", break_even),
     Heading("Behind the means"),
     Figure("failures", failures),
     Figure("dots", dots),
@@ -110,8 +113,7 @@ BLOCKS: tuple[Heading | Figure | TableBlock, ...] = (
     TableBlock("validation", left_out=("pass", "reported")),
     Heading("Stress"),
     TableBlock("extremes", left_out=("converged",)),
-    Heading("How cells, checks and stress tests ended"),
-    TableBlock("endings"),
+    Heading("Cells that failed or were skipped"),
     TableBlock("unfinished"),
 )
 

@@ -8,7 +8,7 @@ Of a run without trajectories, pictures of roll-outs that lie in figures/ stay a
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,9 +18,7 @@ from benchmarks.results.run_folder import RunFolder
 from reference_sim.command_line import Parser, command
 
 if TYPE_CHECKING:
-    from reports.finished_run import Run
-
-SHOWN = 4  # names in a line
+    pass
 
 
 @dataclass(frozen=True)
@@ -65,17 +63,7 @@ def build_report(run_dir: str | Path) -> Built:
             path.unlink()
     report = Report(run, tables, draw_figures(run, folder.figures, FIGURES))
     write_page(folder, report)
-    return Built(write_pdf(folder, report), [*run.problems, *gaps(run)], answer(run, tables))
-
-
-def gaps(run: Run) -> Iterator[str]:
-    """Name what a reader of the numbers has to know first: times of two machines, files that were edited."""
-    rows = run.frame
-    times = rows[rows["unit"].isin(("s", "ms")) & rows["value"].notna()]
-    if len(machines := sorted(set(times["hardware"]) - {""})) > 1:
-        yield f"results.csv: times are of several machines: {', '.join(machines)}"
-    if run.changed:
-        yield f"not as the run wrote them: {', '.join(run.changed[:SHOWN])}"
+    return Built(write_pdf(folder, report), [*run.problems, *run.warnings], answer(run, tables))
 
 
 @command("reports.build", goes_on="the same command begins again", bad_input=(ResultsError,))

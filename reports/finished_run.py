@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from textwrap import shorten
 from typing import Any
 
 import pandas as pd
@@ -184,6 +185,16 @@ class Run:
     def label(self, method: str) -> str:
         """Return the method's name for people."""
         return self.methods[method].label if method in self.methods else method
+
+    @property
+    def warnings(self) -> list[str]:
+        """What a reader of the numbers has to know first: times of two machines, files that were edited."""
+        times = self.frame[self.frame["unit"].isin(("s", "ms")) & self.frame["value"].notna()]
+        machines = sorted(set(times["hardware"]) - {""})
+        found = [f"Times are of several machines: {', '.join(machines)}"] if len(machines) > 1 else []
+        if self.changed:
+            found.append(f"Not as the run wrote them: {shorten(', '.join(self.changed), 100)}")
+        return found
 
     def standing_apart(self, frame: pd.DataFrame) -> set[str]:
         """Return the ablations among these rows whose base has a usable number: they have their own table."""

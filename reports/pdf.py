@@ -6,8 +6,7 @@ It is to be read in minutes: what is long stands in tables/ and in report.html, 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Mapping, Sequence
 from datetime import datetime
 from pathlib import Path
 from textwrap import shorten
@@ -58,7 +57,6 @@ def moment(text: object) -> datetime | None:
 
 Values = dict[str, Any]  # of one block, as JSON takes them
 FEW = 5  # up to so many columns, the columns of a table share its width evenly
-MOST = 9  # columns of numbers that fit on a page; a wider table goes on below
 
 
 def lay_out(report: Report, block: Figure | TableBlock) -> list[Values]:
@@ -68,7 +66,7 @@ def lay_out(report: Report, block: Figure | TableBlock) -> list[Values]:
     if block.name not in report.tables:
         return []
     table = block.printed(report.tables[block.name])
-    return list(lay_out_table(report.run, table)) if table.rows else []
+    return [lay_out_table(report.run, table)] if table.rows else []
 
 
 def _figure(picture: Picture) -> Values:
@@ -80,30 +78,14 @@ def _figure(picture: Picture) -> Values:
     }
 
 
-def lay_out_table(run: Run, table: Table) -> Iterator[Values]:
-    """Yield a table, in parts where it has more columns than fit on a page."""
-    heads = [column for column in table.columns if column.text]
-    numbers = [column for column in table.columns if not column.text]
-    parts = max(1, -(-len(numbers) // MOST))
-    each = max(1, -(-len(numbers) // parts))
-    for first in range(0, max(len(numbers), 1), each):
-        shown = {column.name for column in (*heads, *numbers[first : first + each])}
-        places = [place for place, column in enumerate(table.columns) if column.name in shown]
-        rows = [tuple(row[place] for place in places) for row in table.rows]
-        columns = tuple(table.columns[place] for place in places)
-        rows = [row for row in rows if first == 0 or any(cell is not None for cell in row[len(heads) :])]
-        caption = table.caption + (" (continued)" if first else "")
-        yield _part(run, replace(table, columns=columns, rows=tuple(rows), caption=caption))
-
-
-def _part(run: Run, table: Table) -> Values:
+def lay_out_table(run: Run, table: Table) -> Values:
+    """Return the values of a table."""
     heads = [place for place, column in enumerate(table.columns) if column.name in table.grouped_by]
     places = [place for place in range(len(table.columns)) if place not in heads]
     columns = [table.columns[place] for place in places]
-    references = [r for r in table.references if any(column.name in r[1] for column in columns)]
     cells = []
     for rank, (place, column) in enumerate(zip(places, columns)):
-        printed = [label if rank == 0 else texts.get(column.name, DASH) for label, texts in references]
+        printed = [label if rank == 0 else texts.get(column.name, DASH) for label, texts in table.references]
         cells.append(column_texts(run, column, [row[place] for row in table.rows], printed))
     lines = [list(line) for line in zip(*cells)]
     groups: dict[str, list[list[CellText]]] = {}
@@ -130,7 +112,6 @@ def _widths(columns: Sequence[Column]) -> list[str]:
     return ["auto"] * len(columns)
 
 
-FILES = 4  # names of files that are not as the run wrote them
 DEFINED = ("energies", "curvature", "cost", "overview")  # tables whose metrics are defined
 
 
@@ -149,7 +130,7 @@ def content(report: Report) -> dict[str, Any]:
         "subtitle": report.subtitle,
         # That of a smoke test says that its numbers mean nothing.
         "size": str((config.get("preset_values") or {}).get("description") or ""),
-        "changed": changed_files(run),
+        "warnings": ". ".join([*run.warnings, ""]).strip(),
         "sentences": headline(run),
         "first": sections[0]["blocks"],
         "workers": f"up to {workers} side by side" if workers > 1 else "one after another",
@@ -157,14 +138,6 @@ def content(report: Report) -> dict[str, Any]:
         "sections": [section for section in sections[1:] if section["blocks"]],
         "definitions": _definitions(report),
     }
-
-
-def changed_files(run: Run) -> str:
-    """Say that files are not what the run wrote: a reader of the numbers is to know it first."""
-    if not run.changed:
-        return ""
-    more = f" and {len(run.changed) - FILES} more" if len(run.changed) > FILES else ""
-    return f"Not as the run wrote them: {', '.join(run.changed[:FILES])}{more}. This report is of them."
 
 
 def _definitions(report: Report) -> list[list[str]]:

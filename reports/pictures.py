@@ -219,48 +219,32 @@ def draw_side_by_side(run: Run, roll_outs: SceneRollOuts, methods: Sequence[str]
     return Drawing(figure, f"frames_{file_name(roll_outs.scene)}", caption, vector=False)
 
 
-@dataclass(frozen=True)
-class Failure:
-    """A roll-out that went far wrong: its method, the frame to look at, and a text for below it."""
-
-    roll_outs: SceneRollOuts
-    method: str
-    frame: int
-    text: str
-
-
 def failures(run: Run) -> Iterator[Drawing]:
     """Draw trained networks with most strain over the simulation's, where their roll-outs are on disk."""
-    worst = worst_failures(run)
-    if not worst:
-        return
-    wide = PAGE_WIDTH / max(len(worst), 4)
+    wide = PAGE_WIDTH / MOST_FAILURES
     tile = (wide, 1.1 * wide)
-    images = [shots(f.roll_outs, [f.method], f.frame, tile)[0] for f in worst]
-    names = [f"{run.label(f.method)}: {f.roll_outs.scene.rpartition('/')[2]}" for f in worst]
-    heads = [wrapped(name, round(14 * wide)) for name in names]
-    figure = sheet(images, tile, heads, [f.text for f in worst])
-    caption = "The worst of trained networks by strain over the simulation's: each at its worst frame."
-    yield Drawing(figure, "failures", caption, vector=False)
-
-
-def worst_failures(run: Run) -> list[Failure]:
-    """Return the failures that are shown."""
-    failures: list[Failure] = []
+    images: list[np.ndarray] = []
+    heads, below = [], []
     shown: Counter[str] = Counter()
     for method, scene, strain, ratio in overstretched(run):
-        if len(failures) == MOST_FAILURES or shown[method] == OF_ONE:
+        if len(images) == MOST_FAILURES or shown[method] == OF_ONE:
             continue
         roll_outs = read_scene(run, run.frame[run.frame["scene"] == scene], [method])
-        if method in roll_outs.series:
-            cloth = roll_outs.series[method]
-            curve = cloth.frame_fields.get(STRAIN)
-            last = cloth.frames - 1
-            frame = last if curve is None else int(np.argmax(np.nan_to_num(curve[: cloth.frames])))
-            text = f"{number(strain)} J of strain,\n{number(ratio)} × the simulation's"
-            failures.append(Failure(roll_outs, method, frame, text))
+        if cloth := roll_outs.series.get(method):
+            images += shots(roll_outs, [method], worst_frame(cloth), tile)
+            name = f"{run.label(method)}: {scene.rpartition('/')[2]}"
+            heads.append(wrapped(name, round(14 * wide)))
+            below.append(f"{number(strain)} J of strain,\n{number(ratio)} × the simulation's")
             shown[method] += 1
-    return failures
+    if images:
+        caption = "The worst of trained networks by strain over the simulation's: each at its worst frame."
+        yield Drawing(sheet(images, tile, heads, below), "failures", caption, vector=False)
+
+
+def worst_frame(cloth: Trajectory) -> int:
+    """Return the frame with most strain, the last where the strain is unknown."""
+    strain = cloth.frame_fields.get(STRAIN)
+    return cloth.frames - 1 if strain is None else int(np.argmax(np.nan_to_num(strain[: cloth.frames])))
 
 
 def sheet(

@@ -9,7 +9,6 @@ from functools import lru_cache
 import pandas as pd
 
 from reports.finished_run import Run
-from reports.statistics.effects import Effect
 from reports.statistics.means_and_spreads import ensemble_spread, mean_of
 from reports.statistics.outcomes import (
     BAD,
@@ -17,7 +16,6 @@ from reports.statistics.outcomes import (
     LEARNED,
     counted,
     leads,
-    published_beside,
     subjects,
 )
 from reports.statistics.paper_claims import counts, in_words, judged
@@ -61,11 +59,10 @@ def nearness(run: Run, worn: pd.DataFrame) -> str:
     scenes = set(rows[(rows["metric"] == RELATIVE_EXCESS.name) & rows["usable"]]["scene"])
     shares = [f"{run.label(name)} {_share(excess)}" for name, excess in known.items()]
     worst = [f"{run.label(name)} {number(of.worst[1], 2)} %{of.fewer}" for name, of in known.items()]
-    beside = published_beside(run, next(iter(known)))
     return (
         f"On {len(scenes)} {_kind(run, scenes)}motion{'' if len(scenes) == 1 else 's'} the relative excess "
-        f"is: {listed(shares)}, where the reference has 0 % and skinning alone 100 %"
-        f"{f' ({beside})' if beside else ''}. These are geometric means over independent sources of motion; "
+        f"is: {listed(shares)}, where the reference has 0 % and skinning alone 100 %. "
+        f"These are geometric means over independent sources of motion; "
         f"pooled: ratios of sums over motions. Worst motions: {listed(worst)}."
     )
 
@@ -79,14 +76,10 @@ def _kind(run: Run, scenes: Collection[str]) -> str:
 
 def _share(excess: Excess) -> str:
     """Return a relative excess as "6.1 % (95 % interval 2.3 to 14; pooled 12 %)", and of which roll-outs."""
-    remarks = "; ".join(filter(None, [_interval(excess.effect), f"pooled {number(excess.pooled, 2)} %"]))
-    return f"{number(excess.typical, 2)} % ({remarks}){excess.fewer}"
-
-
-def _interval(effect: Effect) -> str:
-    """Return "95 % interval 2.3 to 14", empty of an effect without one."""
-    ends = effect.interval
-    return f"95 % interval {' to '.join(number(end, 2) for end in ends)}" if ends else ""
+    remarks = [f"pooled {number(excess.pooled, 2)} %"]
+    if ends := excess.effect.interval:
+        remarks.insert(0, f"95 % interval {' to '.join(number(end, 2) for end in ends)}")
+    return f"{number(excess.typical, 2)} % ({'; '.join(remarks)}){excess.fewer}"
 
 
 def _moves(run: Run, worn: pd.DataFrame) -> str:

@@ -6,8 +6,6 @@ zero, so its dots stand on the scale of its statistics, arcsinh(x / 1 %).
 
 from __future__ import annotations
 
-import itertools
-import math
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -22,7 +20,6 @@ from reports.figures.plotting import (
     Style,
     arcsinh_axis,
     family_style,
-    few,
     file_name,
     fit,
     leading,
@@ -34,17 +31,14 @@ from reports.figures.plotting import (
 )
 from reports.finished_run import ReportedMethod, Run, shown_seeds
 from reports.statistics.means_and_spreads import Mean, means, value_of
+from reports.statistics.outcomes import leads
 from reports.statistics.pareto import (
     ERRORS,
     Point,
     compared_cells,
-    compared_costs,
-    compared_scenes,
-    crossing,
     error_points,
     front,
     indistinct,
-    rivals,
     run_time,
     time_label,
 )
@@ -115,26 +109,15 @@ def _grouped(
     yield from groups.values()
 
 
-DECADES = 9  # below the largest error; what is smaller is drawn on the lower edge
+DECADES = 9  # below the largest error; what is smaller is named, not drawn
 GREY, FRONT, BAND = "#B4B4B4", "#DCDCDC", "#F0F0F0"
 MARKER, SMALL = 5.5, 3.5  # sizes of markers [points]
 
 
-@dataclass(frozen=True)
-class Drawn:
-    """Content of a panel.
-
-    below: methods whose error is too small for the panel. entries: of its legend. band: whether the band of
-    what is inconclusive is in sight.
-    """
-
-    below: set[str]
-    entries: list[Style]
-    band: bool
-
-
-def draw_points(axes: Axes, run: Run, curves: Sequence[Curve], reference: float | None, band: float) -> Drawn:
-    """Draw the curves of one panel.
+def draw_points(
+    axes: Axes, run: Run, curves: Sequence[Curve], reference: float | None, band: float
+) -> set[str]:
+    """Draw the curves of one panel; return the methods whose error is zero or too small for it.
 
     Args:
         axes: of the panel.
@@ -146,57 +129,43 @@ def draw_points(axes: Axes, run: Run, curves: Sequence[Curve], reference: float 
     points = [point for curve in curves for point in (*curve.points, *curve.aside)]
     # An error that cannot be told from the reference needs no decades of its own.
     least = max(max((p.error for p in points), default=1.0) * 10.0**-DECADES, band / 10.0)
-    edge = _limits(axes, points, reference, least)
     best = front(p for p in points if p.error > least)
     if len(best) > 1:
         axes.plot([p.time for p in best], [p.error for p in best], color=FRONT, linewidth=5.0, zorder=1)
     for curve in curves:
-        for point in (*curve.points, *curve.aside):
-            look = style(run, point.method)
-            pale = point in curve.aside
+        shown = [point for point in curve.points if point.error > least]
+        times, errors = [point.time for point in shown], [point.error for point in shown]
+        axes.plot(times, errors, color=curve.look.colour, linestyle=curve.look.line, linewidth=1.1)
+        for point in (*shown, *(point for point in curve.aside if point.error > least)):
             colour = GREY if point.error < band else curve.look.colour
-            _draw_marker(axes, point, look.marker, colour, edge if point.error <= least else None,
-                         SMALL if pale else MARKER, pale)  # fmt: skip
-        heights = [point.error if point.error > least else edge for point in curve.points]
-        times = [point.time for point in curve.points]
-        axes.plot(times, heights, color=curve.look.colour, linestyle=curve.look.line, linewidth=1.1, zorder=2)
-    entries = [curve.look for curve in curves]
-    if band:
-        axes.axhspan(edge / 10.0, band, color=BAND, zorder=0)
+            pale = point in curve.aside
+            _draw_marker(axes, point, style(run, point.method).marker, colour, pale=pale)
     if reference:
         axes.axvline(reference, color="black", linestyle=":", linewidth=1.0)
-        entries.append(Style(run.label(run.reference), "black", "", ":"))
+    axes.margins(0.08)
     log_axis(axes, "x")
     log_axis(axes, "y")
-    return Drawn({p.method for p in points if p.error <= least}, entries, band > axes.get_ylim()[0])
+    low, high = axes.get_ylim()
+    axes.set_ylim(low, high)
+    if band > low:
+        axes.axhspan(low, band, color=BAND, zorder=0)
+    return {point.method for point in points if point.error <= least}
 
 
-def _draw_marker(
-    axes: Axes, point: Point, marker: str, colour: str, edge: float | None, size: float, pale: bool
-) -> None:
-    """Draw a point with its spreads; hollow at the height `edge` where that is given."""
+def _draw_marker(axes: Axes, point: Point, marker: str, colour: str, *, pale: bool) -> None:
+    """Draw a point with its spreads."""
     axes.errorbar(
         point.time,
-        point.error if edge is None else edge,
+        point.error,
         xerr=[[min(point.time_spread / 2, 0.9 * point.time)], [point.time_spread / 2]],
-        yerr=[[min(point.error_spread, 0.9 * abs(point.error))], [point.error_spread]],
-        color=colour, marker=marker, markersize=size, linestyle="none", elinewidth=0.8,
-        zorder=2.2 if pale else 3, alpha=0.45 if pale else 1.0,
-        markerfacecolor=colour if edge is None else "white",
-    )  # fmt: skip
-
-
-def _limits(axes: Axes, points: Sequence[Point], reference: float | None, least: float) -> float:
-    """Set both axes' limits; return the height at which errors below `least` are drawn."""
-    above = [p.error for p in points if p.error > least]
-    low, high = min(above, default=1.0), max(above, default=1.0)
-    margin = max((high / low) ** 0.1, 1.5)
-    edge = low / margin**2
-    axes.set_ylim(edge / 1.5 if len(above) < len(points) else low / margin, high * margin)
-    times = [p.time for p in points] + ([reference] if reference else [])
-    spread = max((max(times) / min(times)) ** 0.08, 1.4)
-    axes.set_xlim(min(times) / spread, max(times) * spread)
-    return edge
+        yerr=[[min(point.error_spread, 0.9 * point.error)], [point.error_spread]],
+        color=colour,
+        marker=marker,
+        markersize=SMALL if pale else MARKER,
+        elinewidth=0.8,
+        zorder=2.2 if pale else 3,
+        alpha=0.45 if pale else 1.0,
+    )
 
 
 def error_of_page_one(run: Run) -> Iterator[Drawing]:
@@ -217,53 +186,23 @@ def _draw_page_one(run: Run, rows: pd.DataFrame, metric: Metric, points: Sequenc
     figure, (axes,) = new_panels(1)
     curves = curves_of(run, points)
     reference = value_of(rows, run.reference, time)
-    drawn = draw_points(axes, run, curves, reference, indistinct(run, rows, metric.name))
+    band = indistinct(run, rows, metric.name)
+    below = draw_points(axes, run, curves, reference, band)
+    entries = [curve.look for curve in curves]
+    if reference:
+        entries.append(Style(run.label(run.reference), "black", "", ":"))
     axes.set(xlabel=time_label(time), ylabel=metric.heading)
-    fit(figure, drawn.entries, markers=True)
+    fit(figure, entries, markers=True)
     caption = f"{rows['scene'].iloc[0]}: lower left is better. Pale line: the best at each time."
     for solvers in (curve for curve in curves if curve.look is SOLVERS):
         first, last = (run.label(solvers.points[end].method) for end in (0, -1))
         caption += f" {SOLVERS.label}: from {first} to {last}"
         caption += "; faint: solvers that another beats in both." if solvers.aside else "."
-    caption += " Grey: within the reference's uncertainty." if drawn.band else ""
-    if drawn.below:
-        names = ", ".join(run.label(method) for method in run.ordered(drawn.below))
-        caption += f" Hollow, on the lower edge: zero or below the panel ({names})."
+    caption += " Grey: within the reference's uncertainty." if band > axes.get_ylim()[0] else ""
+    if below:
+        names = ", ".join(run.label(method) for method in run.ordered(below))
+        caption += f" Zero or below the panel: {names}."
     return Drawing(figure, "error_against_time", caption)
-
-
-MOST_FRAMES = 1e7
-
-
-def break_even(run: Run) -> Iterator[Drawing]:
-    """Draw total time against the number of frames, in the scenes of the first garment with timed solvers.
-
-    Each trained network and each solver has a line; a dot stands where a training has paid.
-    """
-    frame = run.cells("speed", "garments")
-    scenes = next(iter(compared_scenes(run, frame).values()), [])
-    trained, others = compared_costs(run, frame, scenes, rivals(run, frame, scenes))
-    shown = few(run, (cost.method for cost in trained))
-    trained = [cost for cost in trained if cost.method in shown]
-    if not trained or len(trained) + len(others) < 2:
-        return
-    costs = [*others, *trained]
-    figure, (axes,) = new_panels(1)
-    frames = np.logspace(0, math.log10(MOST_FRAMES), 200)
-    for cost in costs:
-        look = style(run, cost.method)
-        axes.plot(frames, [cost.total(n) for n in frames], color=look.colour, linestyle=look.line)
-    for network, rival in itertools.product(trained, others):
-        met = crossing(network, rival)
-        if met is not None and 1.0 <= met <= MOST_FRAMES:
-            colour = style(run, network.method).colour
-            axes.plot(met, network.total(met), "o", color=colour, markersize=4.5)
-    axes.set(xlabel="frames", ylabel="data, training and frames [s]")
-    log_axis(axes, "x")
-    log_axis(axes, "y")
-    fit(figure, [style(run, m) for m in run.ordered(cost.method for cost in costs)])
-    caption = f"Total time against the number of frames ({', '.join(scenes)}). "
-    yield Drawing(figure, "break_even", caption + "Dots: where a training has paid.")
 
 
 TERMS = ("strain", "bending", "inertia")
@@ -276,7 +215,8 @@ def energy_series(run: Run) -> Iterator[Drawing]:
     terms = [term for term in TERMS if term in frames and frames[term].notna().any()]
     if not terms:
         return
-    methods = few(run, frames.dropna(subset=terms, how="all")["method"])
+    have = set(frames.dropna(subset=terms, how="all")["method"])
+    methods = leads(run, run.frame[run.frame["method"].isin(have)])
     curves = {method: frames[frames["method"] == method] for method in methods}
     figure, panels = new_panels(len(terms), 3)
     for axes, term in zip(panels, terms):
@@ -333,7 +273,7 @@ def dots(run: Run) -> Iterator[Drawing]:
             bars = [known and known.typical for known in (excess_of(run, rows, m) for m in methods)]
         shown = _draw_panel(axes, run, methods, of_methods, bars)
         if name == excess:
-            arcsinh_axis(axes, shown, SOFTENING)
+            arcsinh_axis(axes, SOFTENING)
         elif min(shown) > 0.0 and max(shown) > 20.0 * min(shown):
             axes.set_xlim(min(shown) / 1.3, max(shown) * 1.3)
             log_axis(axes, "x")

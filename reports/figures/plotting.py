@@ -16,8 +16,6 @@ from dataclasses import dataclass, replace
 from functools import cache
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from reports.finished_run import ReportedMethod, Run
 
 if TYPE_CHECKING:
@@ -71,7 +69,6 @@ KNOWN = {
 # Roles that a figure shows when it has no room for all; external: roll-outs of the user.
 LEADING = ("reference", "baseline", "network", "external")
 ROOM = 8  # methods that a figure shows whatever they are
-LINES = 5  # methods whose curves a panel holds
 # Members of a family share its colour. Iterations go by doubling: four in a row have four lines.
 _DASHES: tuple[Line, ...] = ((0.0, (8.0, 1.5)), "--", "-.", ":")
 _SPARE = ("#999933", "#661100", "#AA4499", "#117733", "#88CCEE", "#DDCC77")
@@ -116,23 +113,6 @@ def leading(run: Run, methods: Iterable[str]) -> list[str]:
     """
     ordered = run.ordered(set(methods) - set(run.reference_ensemble))
     return ordered if len(ordered) <= ROOM else [m for m in ordered if run.methods[m].role in LEADING]
-
-
-def few(run: Run, methods: Iterable[str]) -> list[str]:
-    """Return at most LINES methods, in order: those that cross in one panel.
-
-    Reference, roll-outs of the user and the first baseline come first, then trained networks.
-    """
-    shown = leading(run, methods)
-    baseline = next((m for m in shown if run.methods[m].role == "baseline"), "")
-
-    def rank(name: str) -> int:
-        method = run.methods[name]
-        if method.role in ("reference", "external") or name == baseline:
-            return 0
-        return 1 if method.role == "network" and not method.base else 2
-
-    return run.ordered(sorted(shown, key=rank)[:LINES])
 
 
 PAGE_WIDTH = 6.7  # inches of text width on the report's page
@@ -231,21 +211,13 @@ def log_axis(axes: Axes, which: str) -> None:
     axis.set_minor_formatter(NullFormatter())
 
 
-def arcsinh_axis(axes: Axes, values: Sequence[float], softening: float) -> None:
-    """Make the x axis of these values logarithmic on both sides of 0, and linear below `softening`."""
-    from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+def arcsinh_axis(axes: Axes, softening: float) -> None:
+    """Make the x axis logarithmic on both sides of 0, and linear below `softening`."""
+    from matplotlib.ticker import AsinhLocator, FuncFormatter
 
-    ends = np.arcsinh(np.array([min(values), max(values)]) / softening)
-    low, high = softening * np.sinh(ends + np.array([-0.05, 0.05]) * max(np.ptp(ends), 1.0))
-    powers = math.floor(math.log10(max(-low, high, softening) / softening))
-    decades = [softening * 10.0**power for power in range(powers % 2, powers + 1, 2 if powers > 2 else 1)]
-    ticks = [0.0, *decades, *(-decade for decade in decades)]
-    apart = [t for t in ticks if t == 0.0 or abs(t) > softening or powers < 2]
     axes.set_xscale("asinh", linear_width=softening)
-    axes.set_xlim(low, high)
-    axes.xaxis.set_major_locator(FixedLocator([tick for tick in apart if low <= tick <= high]))
+    axes.xaxis.set_major_locator(AsinhLocator(softening, numticks=5))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: power_text(value)))
-    axes.xaxis.set_minor_locator(NullLocator())
 
 
 def power_text(value: float) -> str:

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import pandas as pd
 
-from benchmarks.results.row import BEFORE_FRAMES
 from reports.finished_run import Run
-from reports.statistics.means_and_spreads import ensemble_spread, mean_of, means, value_of
+from reports.statistics.means_and_spreads import ensemble_spread, mean_of, means
 
 TIME, REPEATS = "cost/frame", "cost/spread"
 WHOLE = "cost/whole"  # TIME is a method's own work; this is all from pose to world vertices
@@ -163,49 +162,18 @@ def error_points(run: Run, rows: pd.DataFrame, metric: str) -> list[Point]:
 
 
 NETWORK = "snug"  # the method whose accuracy a solver has to reach to be its rival
-ACCURACIES = (("gap/energy", "energy gap"), ("curvature/error", "curvature error"))
+ACCURACIES = ("gap/energy", "curvature/error")
 
 
-@dataclass(frozen=True)
-class Cost:
-    """Cost of a method [s]: before the first frame (data, setup, training) and of each frame."""
-
-    method: str
-    before: float
-    frame: float
-
-    def total(self, frames: float) -> float:
-        """Return the cost of that many frames [s]."""
-        return self.before + frames * self.frame
-
-
-def cost_of(frame: pd.DataFrame, method: str, scenes: Sequence[str]) -> Cost | None:
-    """Return the cost of a method on the scenes, None where it was not timed there, or not in full."""
-    time = value_of(frame, method, run_time(frame[frame["scene"].isin(list(scenes))]), scenes)
-    data, setup, train = (value_of(frame, method, name, scenes) for name in BEFORE_FRAMES)
-    if time is None or (train is not None and data is None):
-        return None  # the time of its simulations is not known any more
-    return Cost(method, (data or 0.0) + (setup or 0.0) + (train or 0.0), time / 1e3)
-
-
-def crossing(dear: Cost, cheap: Cost) -> float | None:
-    """Return from how many frames on `dear`, dearer at the start, is the cheaper one; None: never."""
-    if dear.frame >= cheap.frame:
-        return None
-    return max(0.0, (dear.before - cheap.before) / (cheap.frame - dear.frame))
-
-
-def rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> dict[str, str]:
-    """Return the solvers that SNUG competes with, method -> why: converged, or the fastest as accurate."""
-    reasons = {run.reference: "converged"} if mean_of(frame, run.reference, TIME, scenes) else {}
-    for metric, measure in ACCURACIES:
+def rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
+    """Return the solvers that SNUG competes with: the reference, and the fastest ones as accurate."""
+    names = [run.reference] if mean_of(frame, run.reference, TIME, scenes) else []
+    for metric in ACCURACIES:
         points = points_of(run, frame, scenes, metric)
         network = next((p for p in points if p.method == NETWORK), None)
         best = fastest(solvers(run, points), network.error) if network else None
-        if best is not None and best.method != run.reference:
-            before = reasons.get(best.method)
-            reasons[best.method] = f"{before} and {measure}" if before else measure
-    return reasons
+        names += [best.method] if best else []
+    return list(dict.fromkeys(names))
 
 
 def compared_scenes(run: Run, frame: pd.DataFrame) -> dict[str, list[str]]:
@@ -228,15 +196,3 @@ def reference_scenes(run: Run) -> list[str]:
     """
     clips = compared_scenes(run, run.cells("speed"))
     return next(iter((clips or run.garments(run.garment_rows)).values()), [])
-
-
-def compared_costs(
-    run: Run, frame: pd.DataFrame, scenes: Sequence[str], against: Iterable[str]
-) -> tuple[list[Cost], list[Cost]]:
-    """Return the costs of the trained networks and of the solvers given, where timed on the scenes."""
-    rows = frame[frame["scene"].isin(list(scenes))]
-    training = rows[rows["usable"] & (rows["metric"] == "cost/train") & (rows["value"] > 0.0)]["method"]
-    alone = [m for m in training if run.methods[m].role in ("network", "ablation", "baseline")]
-    costs = ([cost_of(rows, m, scenes) for m in methods] for methods in (run.ordered(alone), against))
-    networks, others = ([cost for cost in known if cost is not None] for known in costs)
-    return networks, others

@@ -10,7 +10,6 @@ from pathlib import Path
 
 from reports.finished_run import Run
 from reports.tables.findings import (
-    endings,
     errors_in_spreads,
     extremes,
     findings,
@@ -37,7 +36,6 @@ TABLES: tuple[Callable[[Run], list[Table]], ...] = (
     shapes,
     validation,
     extremes,
-    endings,
     unfinished,
 )
 

@@ -10,7 +10,7 @@ from benchmarks.metric import Metric
 from reports.finished_run import Run
 from reports.statistics.effects import recording_of
 from reports.statistics.means_and_spreads import AT_REFERENCE, in_spreads
-from reports.statistics.outcomes import BAD, check_name, checks, counted, stress_tests, tolerances_away
+from reports.statistics.outcomes import check_name, checks, stress_tests, tolerances_away
 from reports.statistics.paper_claims import judged
 from reports.statistics.relative_excess import SKINNING, Excess, excess_of, with_relative_excess
 from reports.statistics.verdicts import measure_of, standing, untested
@@ -184,16 +184,6 @@ def extremes(run: Run) -> list[Table]:
         Column("reason", "In words", text=True),
     )
     return table("extremes", columns, lines, "Every stress test and how it ended.")
-
-
-def endings(run: Run) -> list[Table]:
-    """Count cells, checks and stress tests by how they ended."""
-    ends = ("ok", *BAD, "skipped")
-    lines: list[tuple[Cell, ...]] = [
-        (kind, *(counts[end] for end in ends), sum(counts.values())) for kind, counts in counted(run).items()
-    ]
-    columns = [Column(name, name.capitalize()) for name in (*ends, "all")]
-    return table("endings", (Column("what", "What", text=True), *columns), lines, "How many ended how.")
 
 
 def unfinished(run: Run) -> list[Table]:

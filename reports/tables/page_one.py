@@ -28,7 +28,7 @@ from reports.statistics.verdicts import compare_methods
 from reports.tables.table import Cell, Column, Table, in_scenes, metric_column, table
 
 ROWS = 8
-ANSWERS = ("distance/rms", "penetration/surface", "dynamics/amplitude", "dynamics/correlation")
+ANSWERS = ("penetration/surface", "dynamics/amplitude", "dynamics/correlation")
 GAP = "gap/energy"
 
 
@@ -55,8 +55,8 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     # Of a family of networks the last one: that of the highest level.
     last = {run.methods[m].family: m for m in others}
     chosen += [m for m in last.values() if m not in chosen]
-    why = rivals(run, cells, scenes) if scenes else {}
-    solvers = [m for m in why if m not in chosen]
+    best = rivals(run, cells, scenes) if scenes else []
+    solvers = [m for m in best if m not in chosen]
     chosen = run.ordered(methods or [*chosen[: ROWS - len(solvers)], *solvers])
     wanted = [(name, rows_of_garment) for name in ANSWERS] + [(GAP, timed), (run_time(timed), timed)]
     wanted += [("cost/train", rows_of_garment)]

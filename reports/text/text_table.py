@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 
 from reports.finished_run import Run
 from reports.sentences import headline
@@ -80,7 +79,6 @@ def markdown_table(rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 
-MOST_METHODS = 6
 COLUMNS = (
     "method", "relative_excess", "dynamics/amplitude", "penetration/surface", "cost/whole", "cost/frame",
     "gap/energy", "faster",
@@ -89,26 +87,14 @@ MOST_COLUMNS = 5  # of COLUMNS, without the intervals of effects
 
 
 def answer(run: Run, tables: Mapping[str, Table]) -> str:
-    """Return table and chief sentences of page one, empty where the run has neither.
-
-    At most eight lines: with the counts, the times and the path of the report that follow, ten.
-    """
+    """Return table and chief sentences of page one, empty where the run has neither."""
     lines, notes = [], []
     if "overview" in tables:
-        table, left_out = _shortened(run, tables["overview"])
+        table = tables["overview"]
         names = [column.name for column in table.columns]
         rows = text_rows(run, table, [name for name in COLUMNS if name in names][:MOST_COLUMNS])
         lines.append(aligned_text(rows))
-        notes = [remarks_on(rows), f"The report also has {', '.join(left_out)}." if left_out else ""]
+        notes = [remarks_on(rows)]
     chief = [text for topic, text in headline(run) if topic == "How near"]
     lines.append(" ".join(filter(None, [*chief, *notes])))
     return "\n".join(filter(None, lines)).replace("\u00a0", " ")
-
-
-def _shortened(run: Run, table: Table) -> tuple[Table, list[str]]:
-    """Return MOST_METHODS lines of the table and the labels of the others, of which variants come first."""
-    methods = [str(line[0]) for line in table.rows]
-    variants = sorted(methods, key=lambda name: run.methods[name].base in methods)
-    kept = set(variants[:MOST_METHODS])
-    rows = tuple(line for line in table.rows if line[0] in kept)
-    return replace(table, rows=rows), [run.label(name) for name in methods if name not in kept]

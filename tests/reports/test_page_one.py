@@ -9,7 +9,6 @@ import re
 from reports.pdf import content
 from reports.sentences import endings, headline
 from reports.statistics.outcomes import leads
-from reports.tables import make_tables
 from tests.reports.report_folder import SCENES, all_rows, report_of, row, run_of
 from tests.reports.tables.test_tables import on_two_scenes
 
@@ -73,9 +72,6 @@ def test_page_one_counts_every_kind_of_ending():
     assert endings(run_of(rows)).endswith(
         "cells 2 failed, 1 timeout, 1 stalled, 1 skipped; of 3 checks 1 failed; of 2 stress tests 1 timeout."
     )
-    table = make_tables(run_of(rows))["endings"]
-    lines = {line[0]: dict(zip([c.name for c in table.columns], line)) for line in table.rows}
-    assert lines["checks"]["failed"] == 1 and lines["checks"]["all"] == 3 and lines["cells"]["timeout"] == 1
     # A metric that is not finite, or off its tolerance, fails no cell that has others.
     bad = row("tshirt/walk", "pbns", "gap/energy", None, status="failed", reason="no number")
     assert "cells 2 failed, 1 timeout, 1 stalled, 1 skipped;" in endings(run_of([*rows, bad]))

@@ -13,7 +13,7 @@ from reference_sim import Trajectory
 from reference_sim.files.mesh_files import read_mesh
 from reference_sim.trajectory import read_point_cache
 from reports import film, pictures
-from reports.pictures import SceneRollOuts, camera_axes, draw_side_by_side, failures, worst_failures
+from reports.pictures import SceneRollOuts, camera_axes, draw_side_by_side, failures, worst_frame
 from tests.reports.report_folder import FRAMES, Stored, mesh, row, run_folder, run_of, sheet, write_mesh
 
 
@@ -59,7 +59,7 @@ def test_a_failure_is_shown_at_its_worst_frame():
     assert list(failures(run)) == []
     stored = replace(run, roll_outs=Stored(stored=mesh(cloth, faces, strain)))
     (drawing,) = failures(stored)
-    assert drawing.name == "failures" and worst_failures(stored)[0].frame == 1
+    assert drawing.name == "failures" and worst_frame(mesh(cloth, faces, strain)) == 1
 
 
 SCENE = "tshirt/walk"

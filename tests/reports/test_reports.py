@@ -16,7 +16,6 @@ from reports import build
 from reports.blocks import FIGURES
 from reports.figures.figure import draw_figures
 from reports.finished_run import make_run, read_run
-from reports.pdf import changed_files
 from reports.statistics.means_and_spreads import Mean
 from reports.tables import make_tables
 from tests.reports.report_folder import (
@@ -159,11 +158,9 @@ def test_page_one_names_the_files_that_are_not_as_the_run_wrote_them(tmp_path):
     run.write_rows(all_rows())
     digests = {"results.csv": digest_of_file(run.rows_path), "trajectories/gone.vtkhdf": "0"}
     run.write_config(declaration(all_rows(), digests=digests))
-    assert read_run(run).changed == []
-    assert changed_files(read_run(run)) == ""
+    assert read_run(run).warnings == []
     run.write_rows(all_rows()[:-1])
-    sentence = changed_files(read_run(run))
-    assert sentence.startswith("Not as the run wrote them: results.csv.")
+    assert read_run(run).warnings == ["Not as the run wrote them: results.csv"]
 
 
 def test_a_metric_nobody_heard_of_makes_its_own_table(tmp_path):
@@ -187,6 +184,6 @@ def test_a_metric_nobody_heard_of_makes_its_own_table(tmp_path):
 
 def test_times_of_several_machines_are_named():
     times = [row(method=method, metric="cost/frame", unit="ms") for method in ("snug", "pbns")]
-    assert list(build.gaps(run_of(times))) == []
-    (gap,) = build.gaps(run_of([times[0], replace(times[1], hardware="another")]))
-    assert "times are of several machines" in gap
+    assert run_of(times).warnings == []
+    (warning,) = run_of([times[0], replace(times[1], hardware="another")]).warnings
+    assert warning == "Times are of several machines: another, here"

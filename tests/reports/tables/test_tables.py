@@ -49,7 +49,7 @@ def test_a_failed_cell_enters_no_mean_and_the_table_says_so():
     lines = {line[1]: line[2] for line in table.rows}
     assert lines["snug"].value == 1.0 and not lines["snug"].complete
     assert lines["simulation"].value == 5.0 and lines["simulation"].complete and lines["simulation"].stalled
-    (block,) = lay_out_table(run, table)
+    block = lay_out_table(run, table)
     assert [line[1]["mark"] for line in block["groups"][0]["rows"]] == ["†", "*"]
     assert "fewer scenes" in block["note"] and "unconverged" in block["note"]
 
@@ -63,7 +63,7 @@ def test_a_check_that_must_be_exact_is_no_tolerances_away_or_infinitely_many():
     rows += [row("off", value=7.0, tolerance=0.0, **numbers_of), row("told", value=7.0, **numbers_of)]
     table = make_tables(run_of(rows))["validation"]
     assert [line[column(table, "away")] for line in table.rows] == [0.0, 0.25, float("inf"), None]
-    (block,) = lay_out_table(run_of(rows), table)
+    block = lay_out_table(run_of(rows), table)
     assert block["groups"][0]["rows"][2][column(table, "away")]["text"] == "∞"
 
 
