@@ -111,12 +111,7 @@ class DressedBody:
                 zeros behind it up to SHAPES numbers; `joint_motion`: pose and rates of single joints
                 (snug.networks.ncs), whatever the recipe says.
             still: as if each pose were held, whatever came before it.
-
-        Raises:
-            ValueError: for an unknown feature set.
         """
-        if feature_set not in FEATURE_SETS:
-            raise ValueError(f"unknown features {feature_set!r}: use one of {tuple(FEATURE_SETS)}")
         if feature_set == "joint_motion":
             pose, rates = joint_motion(self.body, motion, betas)
             return torch.from_numpy(np.concatenate([pose, rates * (not still)], axis=1).astype(np.float32))

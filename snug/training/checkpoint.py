@@ -42,10 +42,6 @@ class Checkpoint:
         """Delete the file, if there is one."""
         self.path.unlink(missing_ok=True)
 
-    def is_due(self, seconds: float) -> bool:
-        """Return whether to write one `seconds` [s] after the last."""
-        return 0 < 60 * self.minutes < seconds
-
     def write(
         self, identity: Mapping[str, Any], tensors: Mapping[str, Tensor], state: Mapping[str, Any]
     ) -> None:

@@ -71,8 +71,6 @@ class Trainer:
             raise TrainingError(f"seed={seed}: give a number from 0 to 2^63 - 1")
         if not motions:
             raise TrainingError("no motions to train on")
-        if kernels and device.type != "cpu":
-            raise TrainingError(f"kernels=True, device={device}: the kernels run on a CPU alone")
         how = find_kind(kind)
         self.kind, self.how, self.recipe, self.steps, self.seed = kind, how, recipe, steps, seed
         self.device = device

@@ -281,8 +281,7 @@ class PhysicsLoss:
         """Return the recipe's form of inertia (N, T) [J], scaled as `__call__` has it."""
         x_hat = 2 * x[:, 1:-1] - x[:, :-2] + ahead[:, 2:, None]
         if self.inertia_form == "two_transitions":
-            if behind is None:
-                raise ValueError("inertia_form 'two_transitions' needs behind, the motion of the pelvis")
+            assert behind is not None
             x_hat = torch.cat([x[:, :1] + behind[:, 1:2, None], x_hat], 1)  # no velocity before the first
         elif self.inertia_form == "detached_past":
             x_hat = x_hat.detach()

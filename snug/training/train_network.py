@@ -103,8 +103,9 @@ class TrainingLoop:
             bar.set_postfix(loss=f"{row['loss']:.4g}", refresh=False)
             if self.log:
                 self.log(row)
-        if self.checkpoint and not last and self.checkpoint.is_due(time.perf_counter() - self._saved):
-            self._save(self.checkpoint)
+        checkpoint = self.checkpoint
+        if checkpoint and not last and 0 < 60 * checkpoint.minutes < time.perf_counter() - self._saved:
+            self._save(checkpoint)
 
     def _row(self) -> dict[str, float]:
         """Return the row of the history over the recent steps, and begin the next."""

@@ -21,8 +21,9 @@ from tests.snug.training.dressing import PLAIN, swaying, tube_dress
 MOTIONS = [swaying(30), swaying(11, name="slow", degrees=10.0)]
 
 
-def made(motions=MOTIONS, **options):
-    return Trainer("snug", tube_dress(), motions, steps=9, seed=0, recipe=replace(PLAIN, **options))
+def made(motions=MOTIONS, kernels=True, **options):
+    recipe = replace(PLAIN, **options)
+    return Trainer("snug", tube_dress(), motions, steps=9, seed=0, recipe=recipe, kernels=kernels)
 
 
 def test_across_a_side_lies_the_face_that_shares_it():
@@ -32,9 +33,8 @@ def test_across_a_side_lies_the_face_that_shares_it():
 
 @pytest.mark.parametrize("kernels", [True, False])
 def test_what_is_no_number_or_not_trusted_moves_no_anchor(kernels):
-    trainer = Trainer("snug", tube_dress(), MOTIONS, steps=9, seed=0, recipe=PLAIN, kernels=kernels)
+    trainer = made(kernels=kernels)
     contact = trainer.contact
-    assert contact is not None
     before = [torch.as_tensor(table).clone() for table in (contact.cache.faces, contact.cache.barycentric)]
 
     def kept():
@@ -45,53 +45,45 @@ def test_what_is_no_number_or_not_trusted_moves_no_anchor(kernels):
     posed = contact.bodies.posed(batch)
     x = skin(batch.rest, trainer.weights, batch.transforms) - torch.tensor([0.0, 0.0, 0.08])
     for vertices, trusted, moved in ((torch.nan * x, True, False), (x, False, False), (x, True, True)):
-        assert trainer.loss is not None
         trainer.loss(vertices, batch.ahead, contact.planes(batch, posed, vertices))
         assert all(kept()) == (vertices is not x)
         contact.settle(batch.frames, trusted=trusted)
         assert all(kept()) == (not moved)
 
 
+def patch_of(contact, motion, frames, betas):
+    """The patch of the body of that shape in frames of the motion, from the pelvis."""
+    body = tube_dress().body
+    whole = body.vertices(motion.poses[frames], motion.translations[frames], betas=betas)
+    pelvis = body.joints(betas)[0] + motion.translations[frames][:, None]
+    return whole[:, contact.patch.body_vertices] - pelvis
+
+
 @pytest.mark.parametrize("kernels", [True, False])
 def test_a_sampled_shape_is_touched_where_its_body_is(kernels):
-    trainer = made(shape_range=3.0)
-    if not kernels:
-        trainer = Trainer(
-            "snug", tube_dress(), MOTIONS, steps=9, seed=0, kernels=False, recipe=trainer.recipe
-        )
-    contact, body, motion = trainer.contact, trainer.dressed.body, MOTIONS[0]
-    assert contact is not None
-    betas = np.random.default_rng(2).uniform(-3, 3, (2, body.shape_count))
+    trainer = made(shape_range=3.0, kernels=kernels)
+    contact = trainer.contact
+    betas = np.random.default_rng(2).uniform(-3, 3, (2, 10))
     batch = trainer.data.batch(np.array([4, 17]), betas)  # windows of the first motion begin at every frame
     rows, positions, _ = contact.bodies.posed(batch)
     assert sorted(rows.tolist()) == list(range(6))
-    for place, (row, frame) in enumerate(zip(rows, [4, 5, 6, 17, 18, 19])):
-        shape = betas[place // 3]
-        whole = body.vertices(motion.poses[[frame]], motion.translations[[frame]], betas=shape)[0]
-        pelvis = body.joints(shape)[0] + motion.translations[frame]
-        expected = whole[contact.patch.body_vertices] - pelvis
-        assert np.allclose(np.asarray(positions)[row], expected, atol=1e-4)
+    expected = [patch_of(contact, MOTIONS[0], slice(f, f + 3), shape) for f, shape in zip((4, 17), betas)]
+    assert np.allclose(np.asarray(positions)[rows], np.concatenate(expected), atol=1e-4)
 
 
 @pytest.mark.parametrize("kernels", [True, False])
 def test_a_clip_of_another_shape_is_touched_where_its_body_is(kernels):
-    recipe = replace(DEFAULT, mixed=3.0, shape_range=3.0, shape_of="clip")
-    trainer = Trainer("snug", tube_dress(), MOTIONS, steps=9, seed=0, recipe=recipe, kernels=kernels)
-    contact, data, body = trainer.contact, trainer.data, trainer.dressed.body
-    assert contact is not None and data.shapes is not None and (contact.bodies.kept is not None) == kernels
-    clips = [*MOTIONS, *augment(MOTIONS, recipe, vertices=trainer.dressed.vertices, seed=0)]
+    trainer = made(mixed=3.0, shape_range=3.0, shape_of="clip", kernels=kernels)
+    contact, data = trainer.contact, trainer.data
+    assert (contact.bodies.kept is not None) == kernels
+    clips = [*MOTIONS, *augment(MOTIONS, trainer.recipe, vertices=trainer.dressed.vertices, seed=0)]
     for place in (1, 2, 3):
-        motion, shape, first = clips[place], data.shapes[place], data.first[place]
-        batch = data.at(first + np.array([[3, 4, 5]]))
-        rows, positions, _ = contact.bodies.posed(batch)
-        whole = body.vertices(motion.poses[3:6], motion.translations[3:6], betas=shape)[
-            :, contact.patch.body_vertices
-        ]
-        pelvis = body.joints(shape)[0] + motion.translations[3:6, None]
-        assert np.allclose(np.asarray(positions)[rows], whole - pelvis, atol=1e-4)
-        assert np.allclose(
-            contact.bodies.marks[first + 3 : first + 6], (whole - pelvis)[:, ::MARKED], atol=1e-4
-        )
+        first = data.first[place]
+        expected = patch_of(contact, clips[place], slice(3, 6), data.shapes[place])
+        rows, positions, _ = contact.bodies.posed(data.at(first + np.array([[3, 4, 5]])))
+        assert np.allclose(np.asarray(positions)[rows], expected, atol=1e-4)
+        marks = contact.bodies.marks[first + 3 : first + 6]
+        assert np.allclose(marks, expected[:, ::MARKED], atol=1e-4)
 
 
 def propagated(motions, frame, monkeypatch):
@@ -99,7 +91,6 @@ def propagated(motions, frame, monkeypatch):
     monkeypatch.setattr(contact_planes, "REFRESH", 1 / 48)  # one frame a step
     trainer = made(motions)
     contact = trainer.contact
-    assert contact is not None
     searched = []
     requery = contact.cache.requery
 
@@ -135,7 +126,6 @@ def test_anchors_walk_while_training_and_are_in_its_state(monkeypatch):
     monkeypatch.setattr(contact_planes, "REFRESH", 0.0)
     trainer, other = made(), made()
     contact, twin = trainer.contact, other.contact
-    assert contact is not None and twin is not None
     with torch.no_grad():  # into the skin
         trainer.network.offsets.bias.view(-1, 3)[:, 2] = -0.8
     trainer.step(0)

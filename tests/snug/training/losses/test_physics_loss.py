@@ -100,13 +100,6 @@ def test_hinges_are_those_of_the_recipe(material):
     assert DEFAULT.bending == PAPER.bending == "length_area" != RECIPES["printed-bending"].bending
 
 
-def test_paper_recipe_has_the_papers_contact():
-    """Its 250 J/m^3 of a vertex on a garment of the paper's size, and as much per area on any other."""
-    contact = make_contact(tube_dress().cloth, PAPER)
-    assert len(contact.stencils) == tube_dress().vertices and contact.margin == 0.002
-    assert np.allclose(contact.stiffness, 1.34e6 * contact.sample_areas)
-
-
 def found(patch: Patch, anchors: np.ndarray, weights: np.ndarray, positions: np.ndarray) -> np.ndarray:
     weights = weights / PARTS if weights.dtype == np.uint8 else weights
     corners = positions[patch.faces[anchors]]
