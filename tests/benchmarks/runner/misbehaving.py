@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import signal
 import sys
 import threading
 import time
@@ -41,17 +39,10 @@ class Misbehaving(Method):
         )  # fmt: skip
 
     def batch(self, copies: int):
-        """Many at once: "greedy" takes a third of a gigabyte, "crowded" leaves the work to a thread.
-
-        "crammed" is killed for it, "torn" raises.
-        """
+        """Many at once: "crowded" leaves the work to a thread, "torn" raises."""
 
         def compute() -> np.ndarray:
             still = np.zeros((self.scene.frames, copies, len(self.scene.start), 3))
-            if self.how == "greedy":
-                np.ones(40_000_000).sum()
-            if self.how == "crammed":
-                self._killed(still)
             if self.how == "torn":
                 raise RuntimeError("no two bodies")
             if self.how == "crowded":
@@ -67,9 +58,6 @@ class Misbehaving(Method):
             still = np.zeros((self.scene.frames, 2, 3))
             return Trajectory(still, self.scene.cloth.faces, np.arange(len(still)) * self.scene.dt)
         return None
-
-    def _killed(self, _) -> None:
-        os.kill(os.getpid(), signal.SIGKILL)
 
     def _early(self, positions) -> None:
         """Comes back at once and goes on working in a thread."""
