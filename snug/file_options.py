@@ -7,7 +7,6 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -138,17 +137,16 @@ def parse_motion_files(text: str) -> tuple[str, MotionFileOptions]:
     return path, _made(MotionFileOptions, words, text)
 
 
-def _made(kind: Any, words: Mapping[str, Any], text: str) -> Any:
+def _made(kind: Any, words: dict[str, Any], text: str) -> Any:
     known = [field.name for field in fields(kind)]
     for name in words:
         if name not in known:
             raise ValueError(f"{text}: no word is called '{name}'; there are {', '.join(known)}")
-    places = {name: words[name] for name in ("path", "material") if name in words}
-    for name, place in places.items():
-        if not (isinstance(place, str) and place):
-            raise ValueError(f"{text}: {name}={place}: give a path")
-    paths = {name: Path(place) for name, place in places.items()}
     try:
-        return kind(**{**words, **paths})
+        for name in {"path", "material"} & words.keys():
+            if not (place := words[name]) or place is True:
+                raise ValueError(f"{name}={place}: give a path")
+            words[name] = Path(str(place))
+        return kind(**words)
     except ValueError as error:
         raise ValueError(f"{text}: {error}") from None

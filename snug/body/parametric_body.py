@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -61,7 +61,7 @@ class Body:
         >>> round(Body.load().height, 2)  # [m]
         1.69
         """
-        arrays = {
+        arrays: dict[str, Any] = {
             key: stored.astype(np.float64 if stored.dtype.kind == "f" else np.int64)
             for key, stored in read_arrays(BODY_FILE).items()
         }

@@ -13,7 +13,6 @@ import igl
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from reference_sim.cloth import Cloth
@@ -253,10 +252,7 @@ def piece_of_faces(faces: Index) -> Index:
     >>> piece_of_faces(np.array([[0, 1, 2], [5, 6, 7], [2, 1, 3]])).tolist()
     [0, 1, 0]
     """
-    (edges, _), count = edge_uses(faces), int(faces.max()) + 1
-    graph = coo_array((np.ones(len(edges)), edges.T), shape=(count, count))
-    of_vertex = connected_components(graph, directed=False)[1]
-    return np.unique(of_vertex[faces[:, 0]], return_inverse=True)[1]
+    return np.unique(igl.vertex_components(faces)[faces[:, 0]], return_inverse=True)[1]
 
 
 def open_seam(positions: Array, faces: Index) -> tuple[Index, float]:

@@ -157,7 +157,7 @@ def _misfit(body: Body, skin: Obstacle, positions: Array, distances: Array) -> s
     if depth > MAX_DEPTH or np.mean(distances < -TRAPPED_DEPTH) > TRAPPED_SHARE:
         share = np.mean(distances < 0)
         return f"it lies up to {1e3 * depth:.0f} mm deep in the body, with {share:.0%} of it"
-    at_ends = skin_following(body, ENDS)[body.faces].all(axis=1)
+    at_ends = np.asarray(skin_following(body, ENDS)[body.faces].all(axis=1))
     share = at_ends[skin.planes(positions, 0).faces].mean()
     return f"{share:.0%} of it lies around head, hands or feet" if share > 0.5 else ""
 

@@ -279,13 +279,6 @@ def _actions() -> dict[str, Made]:
     return {name: (table.pop("kind"), "key angles", partial(act, **table)) for name, table in tables.items()}
 
 
-GAITS: dict[str, tuple[str, Callable[[], Frames]]] = {
-    "walk": ("walk", partial(gait, WALK, 4.0)),
-    "brisk_walk": ("walk", partial(gait, WALK, 3.0, pace=1.25)),
-    "run": ("run", partial(gait, RUN, 3.0)),
-    "sudden_stop": ("sudden stop", partial(gait, RUN, 3.0, pace=0.9, stop=1.53)),
-    "climbing_steps": ("climbing steps", partial(gait, CLIMB, 2.4)),
-}
 # Signs, phases and amplitudes differ.
 STOPS: dict[str, Callable[[], Frames]] = {
     "twist_1": partial(twist, -30.0, 0.7, 0.33, 1.6),
@@ -304,9 +297,14 @@ STOPS: dict[str, Callable[[], Frames]] = {
     "twist_stop": partial(twist, 45.0, 1.0, 0.33, 1.9),
     "turning_stop": partial(turning_walk, 32.0, 0.45, 0.95, 2.4),
 }
+CURVES = "normative gait curves"
 MADE: dict[str, Made] = {
     **_actions(),
-    **{name: (kind, "normative gait curves", make) for name, (kind, make) in GAITS.items()},
+    "walk": ("walk", CURVES, partial(gait, WALK, 4.0)),
+    "brisk_walk": ("walk", CURVES, partial(gait, WALK, 3.0, pace=1.25)),
+    "run": ("run", CURVES, partial(gait, RUN, 3.0)),
+    "sudden_stop": ("sudden stop", CURVES, partial(gait, RUN, 3.0, pace=0.9, stop=1.53)),
+    "climbing_steps": ("climbing steps", CURVES, partial(gait, CLIMB, 2.4)),
     **{name: ("stop", "stops within a frame", make) for name, make in STOPS.items()},
 }
 

@@ -59,16 +59,13 @@ class Motion:
     def __post_init__(self) -> None:
         poses = np.ascontiguousarray(self.poses, dtype=np.float64)
         translations = np.ascontiguousarray(self.translations, dtype=np.float64)
-        if poses.ndim != 3 or poses.shape[1:] != (24, 3) or len(poses) == 0:
-            raise MotionError(f"motion {self.name}: poses have shape {poses.shape}; give (frames, 24, 3)")
-        if translations.shape != (len(poses), 3):
-            raise MotionError(
-                f"motion {self.name}: translations have shape {translations.shape}; give ({len(poses)}, 3)"
-            )
+        frames, shapes = len(poses), (poses.shape, translations.shape)
+        if not frames or shapes != ((frames, 24, 3), (frames, 3)):
+            raise MotionError(f"motion {self.name}: arrays {shapes}; give (frames, 24, 3) and (frames, 3)")
         finite = np.isfinite(poses).all(axis=(1, 2)) & np.isfinite(translations).all(axis=1)
         if not finite.all():
-            frames = f"{np.count_nonzero(~finite)} frames, from frame {finite.argmin()} on"
-            raise MotionError(f"motion {self.name}: numbers are not finite in {frames}; cut the clip there")
+            wrong = f"{np.count_nonzero(~finite)} frames, from frame {finite.argmin()} on"
+            raise MotionError(f"motion {self.name}: numbers are not finite in {wrong}; cut the clip there")
         if not (np.isfinite(self.fps) and self.fps > 0):
             raise MotionError(f"motion {self.name}: {self.fps} frames per second; give a positive rate")
         object.__setattr__(self, "poses", poses)
@@ -143,16 +140,11 @@ def resample(motion: Motion, fps: float = 30.0) -> Motion:
     in all, so that frames stay evenly spaced at exactly `fps` (the simulator's time step is fixed). A clip of
     less than one new frame is stretched to one.
 
-    Raises:
-        MotionError: a rate that is not positive.
-
     >>> import numpy as np
     >>> fast = Motion("standing", poses=np.zeros((121, 24, 3)), translations=np.zeros((121, 3)), fps=120.0)
     >>> resample(fast, 30.0).frames
     31
     """
-    if not (np.isfinite(fps) and fps > 0):
-        raise MotionError(f"motion {motion.name}: cannot resample to {fps} frames per second")
     if motion.frames == 1 or fps == motion.fps:
         return replace(motion, fps=fps)
     intervals = max(1, round(motion.duration * fps))
@@ -172,7 +164,7 @@ def transition(pose_a: np.ndarray, pose_b: np.ndarray, frames: int) -> np.ndarra
     Args:
         pose_a: (24, 3) [rad], the first frame.
         pose_b: (24, 3) [rad], the last frame.
-        frames: number of frames, at least 2.
+        frames: number of frames.
 
     Returns:
         Poses (frames, 24, 3) [rad].
@@ -184,8 +176,6 @@ def transition(pose_a: np.ndarray, pose_b: np.ndarray, frames: int) -> np.ndarra
     >>> transition(np.zeros((24, 3)), np.full((24, 3), 0.1), 5)[2, 0].round(3)
     array([0.05, 0.05, 0.05])
     """
-    if frames < 2:
-        raise MotionError(f"a transition needs at least 2 frames, not {frames}")
     ease = smoothstep(np.linspace(0.0, 1.0, frames)[:, None])
     shape = (frames, 24, 3)
     return slerp(np.broadcast_to(pose_a, shape), np.broadcast_to(pose_b, shape), ease)
@@ -238,21 +228,15 @@ def mirror_motion(motion: Motion) -> Motion:
     >>> mirror_motion(step).translations
     array([[-0.2,  0. ,  0. ]])
     """
-    twin = [JOINT[_other_side(name)] for name in JOINT]
-    return Motion(
+    other = {"left": "right", "right": "left"}
+    sides = (name.partition("_") for name in JOINT)
+    twin = [JOINT[f"{other.get(side, side)}{bar}{part}"] for side, bar, part in sides]
+    return replace(
+        motion,
         name=f"{motion.name}_mirrored",
         poses=motion.poses[:, twin] * [1.0, -1.0, -1.0],
         translations=motion.translations * [-1.0, 1.0, 1.0],
-        fps=motion.fps,
-        kind=motion.kind,
-        source=motion.source,
     )
-
-
-def _other_side(name: str) -> str:
-    if name.startswith("left_"):
-        return "right_" + name.removeprefix("left_")
-    return "left_" + name.removeprefix("right_") if name.startswith("right_") else name
 
 
 def nearest_pose(poses: np.ndarray, others: np.ndarray) -> np.ndarray:
