@@ -1,10 +1,13 @@
 """The body of the package is a closed adult that poses as SMPL does."""
 
+import igl
 import numpy as np
 import pytest
+import torch
 from scipy.spatial.transform import Rotation
 
 from snug.body.skeleton import JOINT_NAMES, BodyError
+from snug.body.skinning import joint_transforms, skin
 from tests.snug.body.other_bodies import volume
 
 
@@ -45,20 +48,13 @@ def test_shapes_start_at_the_template_and_the_first_one_is_height(body):
     assert change > 1.1 and abs(np.ptp(body.shaped(fat)[:, 1]) - np.ptp(body.shaped(-fat)[:, 1])) < 0.03
 
 
-@pytest.mark.parametrize("seed", range(3))
-def test_joints_stay_inside_every_body(body, seed):
-    from igl import fast_winding_number
-
-    betas = np.random.default_rng(seed).normal(size=10)
-    inside = fast_winding_number(body.shaped(betas), body.faces, body.joints(betas))
-    assert inside.min() > 0.5, [JOINT_NAMES[j] for j in np.flatnonzero(inside < 0.5)]
+def test_joints_stay_inside_every_body(body):
+    for betas in np.random.default_rng(0).normal(size=(3, 10)):
+        inside = igl.fast_winding_number(body.shaped(betas), body.faces, body.joints(betas))
+        assert inside.min() > 0.5, [JOINT_NAMES[j] for j in np.flatnonzero(inside < 0.5)]
 
 
 def test_vertices_agree_with_the_skinning_used_in_training(body):
-    import torch
-
-    from snug.body.skinning import joint_transforms, skin
-
     random = np.random.default_rng(1)
     poses, shifts = random.normal(scale=0.5, size=(70, 24, 3)), random.normal(size=(70, 3))
     betas = random.normal(size=10)
@@ -93,15 +89,14 @@ def test_elbow_and_knee_bend_their_own_side(body):
 
 
 @pytest.mark.parametrize(
-    ("poses", "translations", "betas"),
+    ("poses", "betas"),
     [
-        (np.zeros((2, 22, 3)), np.zeros((2, 3)), None),
-        (np.zeros((2, 24, 3)), np.zeros((3, 3)), None),
-        (np.full((2, 24, 3), np.nan), np.zeros((2, 3)), None),
-        (np.zeros((2, 24, 3)), np.zeros((2, 3)), np.zeros(3)),
-        (np.zeros((2, 24, 3)), np.zeros((2, 3)), np.full(10, np.inf)),
+        (np.zeros((2, 22, 3)), None),
+        (np.full((2, 24, 3), np.nan), None),
+        (np.zeros((2, 24, 3)), np.zeros(3)),
+        (np.zeros((2, 24, 3)), np.full(10, np.inf)),
     ],
 )
-def test_wrong_arguments_are_refused(body, poses, translations, betas):
+def test_wrong_arguments_are_refused(body, poses, betas):
     with pytest.raises(BodyError):
-        body.vertices(poses, translations, betas)
+        body.vertices(poses, np.zeros((2, 3)), betas)

@@ -114,16 +114,10 @@ def test_the_eyes_of_a_head_are_closed(small, layouts, tmp_path):
 
 
 def changed(key, change):
-    def of(arrays):
-        array = np.array(arrays[key])
-        return {**arrays, key: change(array)}
-
-    return of
+    return lambda arrays: {**arrays, key: change(np.array(arrays[key]))}
 
 
-def moved_joint(regressor):
-    regressor[18] *= 1e6
-    return regressor
+ELBOW = np.where(np.arange(24) == 18, 1e6, 1.0)[:, None]
 
 
 @pytest.mark.parametrize(
@@ -133,21 +127,18 @@ def moved_joint(regressor):
         (changed("weights", lambda w: 2 * w), "sum to one"),
         (changed("v_template", lambda v: np.where(v == v[7, 1], np.nan, v)), "v_template has"),
         (changed("v_template", lambda v: v * 1000), "in metres"),
-        (changed("v_template", lambda v: v[:, [0, 2, 1]] * [1, 1, -1]), "in metres"),
         (changed("v_template", lambda v: v * [-1, 1, -1]), "face +z"),
         (changed("v_template", lambda v: v + np.array([0.5, 0, 0])), "beside x = 0"),
         (changed("shapedirs", lambda s: s[:3]), "shapedirs"),
         (lambda a: {k: v for k, v in a.items() if k != "J_regressor"}, "no joints"),
-        (lambda a: a | {"J_regressor": np.array([{"sparse": 1}], dtype=object)}, "plain arrays"),
-        (changed("J_regressor", moved_joint), "left_elbow"),
+        (changed("J_regressor", lambda r: r * ELBOW), "left_elbow"),
         (changed("kintree_table", lambda t: np.full((2, 24), 30)), "hangs on 30"),
         (lambda a: a | {"f": a["f"][a["v_template"][a["f"], 1].min(axis=1) > 0.12]}, "a hole at vertex"),
         (changed("f", lambda f: f[:, ::-1]), "inside out"),
-        (changed("f", lambda f: f[:, [0, 1, 2, 2]]), "shape (any, 3)"),
         (changed("f", lambda f: f + 1), "vertex 1000"),
         (lambda a: a | {"posedirs": np.zeros((1000, 3, 93))}, "posedirs"),
     ],
-    ids=range(17),
+    ids=range(14),
 )
 def test_a_broken_body_is_refused_in_one_line(layouts, tmp_path, change, says):
     path = saved(tmp_path / "broken.npz", change(layouts["SMPL"]))
@@ -165,12 +156,10 @@ def test_arms_that_hang_down_are_refused(small, tmp_path):
         read_body(path)
 
 
-@pytest.mark.parametrize("ending", [".npz", ".pkl"])
-@pytest.mark.parametrize("content", [None, b"N."])
-def test_a_file_that_is_no_body_is_refused_in_one_line(tmp_path, content, ending):
-    path = tmp_path / f"body{ending}"
-    if content is not None:
-        path.write_bytes(content)
+@pytest.mark.parametrize("name", ["body.npz", "body.pkl", "none.npz"])
+def test_a_file_that_is_no_body_is_refused_in_one_line(tmp_path, name):
+    for broken in ("body.npz", "body.pkl"):
+        (tmp_path / broken).write_bytes(b"N.")
     with pytest.raises(BodyError) as caught:
-        read_body(path)
-    assert str(path) in str(caught.value) and "\n" not in str(caught.value)
+        read_body(tmp_path / name)
+    assert name in str(caught.value) and "\n" not in str(caught.value)

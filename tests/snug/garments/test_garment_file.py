@@ -144,8 +144,8 @@ def moved(garment, change):
     [
         (lambda s: moved(s, lambda x: 100 * x), "not lie on the body .*: give 'mine.obj,units=cm,up=y'$"),
         (lambda s: moved(s, lambda x: z_up(x) / 0.0254), ",units=in,up=z'$"),
-        (lambda s: moved(s, lambda x: x + [0.03, -0.1, 0.02]), "mm deep in the body.*: move it onto"),
-        (lambda s: moved(s, lambda x: x + [0.0, 0.0, 0.5]), "mm from the body.*: move it onto"),
+        (lambda s: moved(s, lambda x: np.add(x, (0.03, -0.1, 0.02))), "mm deep in the body.*: move it onto"),
+        (lambda s: moved(s, lambda x: np.add(x, (0, 0, 0.5))), "mm from the body.*: move it onto"),
         (lambda s: {"faces": np.concatenate([s.faces, s.faces[5:6]])}, "a cloth is manifold"),
         (lambda s: {"faces": one_turned(s.faces)}, "same way"),
         (lambda s: {"faces": closed(s)}, "no opening, the surface is closed"),

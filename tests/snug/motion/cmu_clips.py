@@ -1,52 +1,10 @@
-"""Small ASF and AMC files made in the test: a chain of two bones, and a skeleton like those of CMU."""
+"""Small ASF and AMC files made in the test, of a skeleton like those of CMU."""
 
 from pathlib import Path
 
 import numpy as np
 
-from snug.motion.acclaim import INCH
-
 UNIT = 0.45
-METRES = INCH / UNIT
-
-# A two-bone skeleton for the parser: the second bone's own axes are turned by 90 degrees about z.
-CHAIN = """# comment
-:version 1.10
-:name CHAIN
-:units
-  length 0.45
-  angle deg
-:root
-   order TX TY TZ RX RY RZ
-   axis XYZ
-   position 0 0 0
-   orientation 0 0 0
-:bonedata
-  begin
-     id 1
-     name upper
-     direction 0 2 0
-     length 10
-     axis 0 0 0 XYZ
-    dof rx ry rz
-    limits (-160.0 20.0)
-           (-70.0 70.0)
-           (-60.0 70.0)
-  end
-  begin
-     id 2
-     name lower
-     direction 0 1 0
-     length 5
-     axis 0 0 90 XYZ
-    dof rx
-  end
-:hierarchy
-  begin
-    root upper
-    upper lower
-  end
-"""
 
 
 def cmu_like(splay: float = 20.0) -> str:
@@ -76,7 +34,7 @@ def cmu_like(splay: float = 20.0) -> str:
             (f"{side}hand", (sign, 0, 0), 0.7, (0, sign * 90, sign * 90), "rx", f"{side}wrist"),
             (f"{side}fingers", (sign, 0, 0), 0.6, (0, sign * 90, sign * 90), "", f"{side}hand"),
         ]
-    text = f":units\n length {UNIT}\n angle deg\n:root\n order TX TY TZ RX RY RZ\n"
+    text = f"# comment\n:units\n length {UNIT}\n angle deg\n:root\n order TX TY TZ RX RY RZ\n"
     text += " axis XYZ\n position 0 0 0\n orientation 0 0 0\n:bonedata\n"
     for name, direction, length, axis, dof, _ in bones:
         text += f"begin\n name {name}\n direction {' '.join(map(str, direction))}\n length {length}\n"

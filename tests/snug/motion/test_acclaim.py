@@ -11,44 +11,21 @@ from snug.body.skeleton import (
     joint_positions,
 )
 from snug.file_options import MotionFileOptions
-from snug.motion.acclaim import CMU_RATE, JOINT_BONES, read_amc, read_asf, read_asf_amc, world_turns
+from snug.motion.acclaim import CMU_RATE, JOINT_BONES, read_amc, read_asf, read_asf_amc
 from snug.motion.retarget import LIMBS
-from tests.snug.motion.cmu_clips import CHAIN, METRES, amc_frame, write_clip
+from tests.snug.motion.cmu_clips import amc_frame, write_clip
 from tests.snug.motion.motion_forms import read, refuse
 
 
-class TestParser:
-    def test_lengths_axes_and_hierarchy(self, tmp_path):
-        path = tmp_path / "chain.asf"
-        path.write_text(CHAIN)
-        bones, _ = read_asf(path)
-        assert list(bones) == ["root", "upper", "lower"]
-        upper, lower = bones["upper"], bones["lower"]
-        assert upper.length == pytest.approx(10 * 0.0254 / 0.45)
-        np.testing.assert_allclose(upper.direction, [0, 1, 0])  # made unit length
-        assert (upper.channels, lower.channels, lower.parent) == (("rx", "ry", "rz"), ("rx",), "upper")
-        np.testing.assert_allclose(lower.axes, [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-12)
-
-    def test_forward_kinematics_by_hand(self, tmp_path):
-        (tmp_path / "chain.asf").write_text(CHAIN)
-        clip = tmp_path / "chain.amc"
-        clip.write_text(
-            "1\nroot 1 2 3 0 0 0\nupper 0 0 90\nlower 0\n2\nroot 0 0 0 0 90 0\nupper 90 90 0\nlower 90\n"
-        )
-        bones, metres = read_asf(tmp_path / "chain.asf")
-        channels = read_amc(clip, bones, metres)
-        np.testing.assert_allclose(channels["root"][0, :3], np.array([1, 2, 3]) * METRES)
-        turned = world_turns(bones, channels)
-        up = np.array([0.0, 1.0, 0.0])
-        # Frame 1: the upper bone lies along -x, and the lower one with it.
-        np.testing.assert_allclose(turned["upper"][0] @ up, [-1, 0, 0], atol=1e-12)
-        np.testing.assert_allclose(turned["lower"][0] @ up, [-1, 0, 0], atol=1e-12)
-        # Frame 2: x first: up -> +z; then y: z -> +x; the root's own quarter turn about y: x -> -z.
-        np.testing.assert_allclose(turned["upper"][1] @ up, [0, 0, -1], atol=1e-12)
-        # The lower bone's x axis is the world's y axis: it twists about itself and points on.
-        np.testing.assert_allclose(turned["lower"][1] @ up, [0, 0, -1], atol=1e-12)
-        local = turned["upper"][1].T @ turned["lower"][1]
-        np.testing.assert_allclose(local, Rotation.from_euler("y", 90, degrees=True).as_matrix(), atol=1e-12)
+def test_lengths_axes_and_channels_are_those_of_the_file(tmp_path):
+    write_clip(tmp_path, [])
+    bones, metres = read_asf(tmp_path / "07.asf")
+    thigh, hip = bones["lfemur"], bones["lhipjoint"]
+    assert metres == pytest.approx(0.0254 / 0.45) and thigh.length == pytest.approx(7.0 * metres)
+    np.testing.assert_allclose(hip.direction, np.array([0.6, -0.7, 0.3]) / np.sqrt(0.94))
+    assert (thigh.channels, hip.channels, thigh.parent) == (("rx", "ry", "rz"), (), "lhipjoint")
+    turned = Rotation.from_euler("z", 20, degrees=True).as_matrix()
+    np.testing.assert_allclose(thigh.axes, turned, atol=1e-12)
 
 
 REFUSED = [

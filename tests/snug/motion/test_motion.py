@@ -44,10 +44,6 @@ def library():
     return {name: make_motion(name) for name in ACTING}
 
 
-def standing(frames=3):
-    return Motion("standing", np.zeros((frames, 24, 3)), np.zeros((frames, 3)))
-
-
 @pytest.mark.parametrize("name", STOPPING)
 def test_a_stop_holds_from_one_frame_on_with_feet_on_the_floor(name):
     motion = make_motion(name)
@@ -118,26 +114,20 @@ def test_climbing_goes_up_step_by_step_and_the_standing_foot_rests(library):
 
 
 def test_the_nearest_pose_is_the_mean_angle_of_joints_whatever_the_heading():
-    random = np.random.default_rng(0)
-    poses = 0.4 * random.normal(size=(3, 24, 3))
-    assert nearest_pose(poses, poses[::-1]) == pytest.approx(0.0, abs=1e-6)
-    turned = poses.copy()
-    heading = rotation_matrices(np.array([0.0, 2.0, 0.0]))
-    turned[:, 0] = axis_angles(heading @ rotation_matrices(poses[:, 0]))
-    assert nearest_pose(turned, poses) == pytest.approx(0.0, abs=1e-6)
-    bent = turned.copy()
-    elbow = JOINT["left_elbow"]
-    bent[:, elbow] = axis_angles(
-        rotation_matrices(bent[:, elbow]) @ rotation_matrices(np.array([0.3, 0.0, 0.4]))
-    )
+    poses = 0.4 * np.random.default_rng(0).normal(size=(3, 24, 3))
+
+    def turned(joint, by, before=False):
+        """The poses with one joint turned, in its own axes or before the rotation that it has."""
+        turn, others = rotation_matrices(np.array(by)), poses.copy()
+        rotations = rotation_matrices(poses[:, joint])
+        others[:, joint] = axis_angles(turn @ rotations if before else rotations @ turn)
+        return others
+
+    assert nearest_pose(turned(0, [0.0, 2.0, 0.0], before=True), poses) == pytest.approx(0.0, abs=1e-6)
+    bent = turned(JOINT["left_elbow"], [0.3, 0.0, 0.4])
     bent[:, JOINT["left_hand"]] += 1.0  # hands are left out
-    tilted = bent.copy()
-    tilt = rotation_matrices(np.array([0.2, 0.0, 0.0]))
-    tilted[:, 0] = axis_angles(rotation_matrices(bent[:, 0]) @ tilt)
-    up = rotation_matrices(bent[:, 0])[:, 1]
-    leaning = np.arccos(np.sum(up * (up @ tilt), axis=1))
     assert nearest_pose(bent, poses) == pytest.approx(0.5 / 22, abs=1e-6)
-    assert nearest_pose(tilted, poses) == pytest.approx((0.5 + leaning) / 22, abs=1e-6)
+    assert nearest_pose(turned(0, [0.2, 0.0, 0.0]), poses) == pytest.approx(0.2 / 22, abs=1e-6)
 
 
 def test_unknown_names_list_the_known_ones():
@@ -148,8 +138,7 @@ def test_unknown_names_list_the_known_ones():
 @pytest.mark.parametrize(
     ("poses", "translations", "fps", "message"),
     [
-        (np.zeros((3, 23, 3)), np.zeros((3, 3)), 30.0, "24, 3"),
-        (np.zeros((3, 24, 3)), np.zeros((4, 3)), 30.0, "translations"),
+        (np.zeros((3, 24, 3)), np.zeros((4, 3)), 30.0, r"\(4, 3\)\); give"),
         (np.full((3, 24, 3), np.nan), np.zeros((3, 3)), 30.0, "finite"),
         (np.zeros((3, 24, 3)), np.zeros((3, 3)), 0.0, "frames per second"),
     ],
@@ -197,8 +186,6 @@ def test_transition_leaves_and_arrives_at_rest():
     np.testing.assert_allclose(poses[[0, 15, 30]], [0 * goal, 0.5 * goal, goal], atol=1e-12)
     steps = np.abs(np.diff(poses[:, JOINT["left_shoulder"], 2]))
     assert steps[0] < 1e-3 and steps[-1] < 1e-3 < steps.max()
-    with pytest.raises(MotionError, match="at least 2"):
-        transition(goal, goal, 1)
 
 
 def test_spread_arms_lifts_both_upper_arms_by_the_angle():
@@ -217,22 +204,16 @@ def test_a_turned_motion_faces_that_much_further_round_and_keeps_its_shape():
     motion = make_motion("walk")
     around = turn_about_vertical(motion, 2.0)
     assert heading(around.poses[5]) == pytest.approx(heading(motion.poses[5]) + 2.0)
-    assert heading(turn_about_vertical(around, 2.0).poses[0]) == pytest.approx(
-        heading(motion.poses[0]) + 4.0 - 2 * np.pi
-    )
     np.testing.assert_array_equal(around.poses[:, 1:], motion.poses[:, 1:])
-    np.testing.assert_array_equal(around.translations[0], 0.0)
-    path = motion.translations - motion.translations[0]
-    np.testing.assert_allclose(around.translations[:, 1], path[:, 1], atol=1e-12)
-    # From +z towards +x: x' = cos x + sin z.
-    np.testing.assert_allclose(
-        around.translations[:, 0], np.cos(2.0) * path[:, 0] + np.sin(2.0) * path[:, 2], atol=1e-12
-    )
+    x, y, z = (motion.translations - motion.translations[0]).T
+    # From +z towards +x.
+    expected = [np.cos(2.0) * x + np.sin(2.0) * z, y, np.cos(2.0) * z - np.sin(2.0) * x]
+    np.testing.assert_allclose(around.translations, np.transpose(expected), atol=1e-12)
 
 
 def test_place_faces_forward_on_the_floor():
     rng = np.random.default_rng(3)
-    motion = standing(30)
+    motion = Motion("standing", np.zeros((30, 24, 3)), np.zeros((30, 3)))
     motion.poses[:, 0] = [0.0, 2.1, 0.0]
     start = np.array([3.0, -0.7, 1.0])
     motion.translations[:] = start + np.cumsum(rng.normal(0, 0.01, (30, 3)), axis=0)
