@@ -85,24 +85,16 @@ def global_rotations(poses: np.ndarray, parents: Sequence[int] = PARENTS) -> np.
     return rotations
 
 
-def joint_positions(
-    poses: np.ndarray, translations: np.ndarray, rest_joints: np.ndarray = REST_JOINTS
-) -> np.ndarray:
-    """Compute where the joints are, by forward kinematics.
+def joint_positions(poses: np.ndarray, translations: np.ndarray) -> np.ndarray:
+    """Return where the joints are, (T, 24, 3) [m], by forward kinematics.
 
-    Args:
-        poses: (T, 24, 3) [rad], axis-angle relative to the parent joint.
-        translations: (T, 3) [m] of the root.
-        rest_joints: (24, 3) [m], by default those of the package's body, rounded.
-
-    Returns:
-        Joint positions (T, 24, 3) [m].
+    poses: (T, 24, 3) [rad]. translations: (T, 3) [m] of the root.
 
     >>> import numpy as np
     >>> joint_positions(np.zeros((1, 24, 3)), np.zeros((1, 3)))[0, JOINT["left_knee"]]
     array([0.13, 0.51, 0.02])
     """
-    return _positions(global_rotations(poses), np.asarray(translations), rest_joints)
+    return _positions(global_rotations(poses), np.asarray(translations), REST_JOINTS)
 
 
 def joint_transforms(

@@ -177,7 +177,7 @@ def outlines(points: Array, faces: Index, cuts: list[CutPlane]) -> list[list[tup
         for begin, end in pairwise(stops):
             middle = np.flatnonzero(on[:, begin + 1 : end].all(axis=1))
             if len(middle) != 1 or end - begin < 2:
-                raise ValueError("the surface has an opening that no cut made")
+                raise ValueError("nothing fits this body: its surface is open where no cut is")
             curves.append((cuts[int(middle[0])].name, points[ring[begin : end + 1]]))
         loops.append(curves)
     return loops

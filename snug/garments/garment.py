@@ -179,9 +179,7 @@ def enclosed_limbs(body: Body, positions: Array, faces: Index) -> tuple[str, ...
         np.asfortranarray(positions), np.asfortranarray(faces), np.asfortranarray(body.template)
     )
     inside = np.abs(np.asarray(winding).ravel()) > INSIDE
-    strongest = np.argmax(body.skinning_weights, axis=1)
-    allowed = [name for name in JOINT_NAMES if name not in NEVER]
-    limbs = {name: strongest == JOINT_NAMES.index(name) for name in allowed}
+    limbs = {name: skin_following(body, (name,)) for name in JOINT_NAMES if name not in NEVER}
     limbs = {name: skin for name, skin in limbs.items() if skin.any()}
     return tuple(name for name, skin in limbs.items() if inside[skin].mean() > COVERED) or tuple(limbs)
 

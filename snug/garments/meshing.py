@@ -137,10 +137,7 @@ def _spread(curve: Array, count: int) -> Array:
 def _place_rim(points: Array, loop: Index, outline: list[Array]) -> None:
     """Spread the vertices of a loop, in place, evenly along its outline: a closed curve, or several."""
     if len(outline) == 1:
-        curve = outline[0]
-        start = int(np.argmin(np.linalg.norm(points[loop] - curve[0], axis=1)))
-        points[np.roll(loop, -start)] = _spread(np.concatenate([curve, curve[:1]]), len(loop))
-        return
+        outline = [np.concatenate([outline[0], outline[0][:1]])]
     corners = [int(np.argmin(np.linalg.norm(points[loop] - curve[0], axis=1))) for curve in outline]
     loop = np.roll(loop, -corners[0])
     stops = [(corner - corners[0]) % len(loop) for corner in corners] + [len(loop)]
@@ -190,10 +187,7 @@ def mesh_garment(
     clearance: least distance [m] from the skin. Raises ValueError where no sound mesh comes out.
     """
     sheet, sheet_faces = cut_sheet(surface, cuts)
-    try:
-        curves = outlines(sheet, sheet_faces, cuts)
-    except ValueError as error:
-        raise ValueError(f"nothing fits this body: {error}") from error
+    curves = outlines(sheet, sheet_faces, cuts)
     names = sorted(name for loop in curves for name, _ in loop)
     expected = [cut.name for cut in cuts]  # the seam runs down front and back; of trousers the two are one
     if names not in (sorted([SEAM, *expected]), sorted(expected)) or [SEAM] in [

@@ -112,9 +112,8 @@ READERS: dict[str, Callable[[Path, MotionFileOptions], Motion]] = {
 HAND_DAMPING = 0.1
 HANDS = [JOINT[f"{side}_{joint}"] for side in ("left", "right") for joint in ("wrist", "hand")]
 
-NAME = re.compile(
-    r"\w[\w.+()-]*( [\w.+()-]+)*"
-)  # of a motion: rows of CSV files and lists in options hold it
+# Of a motion: rows of CSV files and lists in options hold it.
+NAME = re.compile(r"\w[\w.+()-]*( [\w.+()-]+)*")
 MAX_NAME_BYTES = 100
 SHAPE_FILES = ("shape.npz", "*_stagei.npz")  # of a subject: AMASS keeps them beside its clips
 

@@ -83,11 +83,11 @@ MAX_ROOT_SPEED = 10.0  # [m/s] of the root: a sprinter's speed
 MAX_ANGLE = 4.0 * np.pi  # [rad] of all joints but the root, whose turns may have been added up
 MAX_ROOT_ANGLE = 1e3  # [rad] of the root
 MAX_DISTANCE = 1e4  # [m]
-MAX_NAMED = 4  # joints, and frames of each, in a message
+MAX_NAMED = 4  # joints in a message
 
 
 def check_recording(motion: Motion) -> None:
-    """Raise MotionError for other units and for jumps; the message names joints and frames."""
+    """Raise MotionError for other units and for jumps; the message names joints and first frames."""
     angles = np.linalg.norm(motion.poses, axis=2)
     if (angles[:, 1:] > MAX_ANGLE).any() or (angles[:, 0] > MAX_ROOT_ANGLE).any():
         raise MotionError("a joint turns by more than a person's; write radians, not degrees")
@@ -97,16 +97,14 @@ def check_recording(motion: Motion) -> None:
     turns = axis_angles(np.swapaxes(rotations[:-1], -1, -2) @ rotations[1:]) / MAX_TURN_SPEED
     shifts = np.diff(motion.translations, axis=0)[:, None] / MAX_ROOT_SPEED
     speeds = np.linalg.norm(np.concatenate([turns, shifts], axis=1), axis=2) * motion.fps
-    errors = []
-    for name, speed in zip((*JOINT_NAMES, "the root"), speeds.T, strict=True):
-        if len(frames := np.flatnonzero(speed > 1.0) + 1):
-            errors.append(f"{name} before frame {_first_of(list(map(str, frames)))}")
+    errors = [
+        f"{name} before frame {jumps.argmax() + 1}"
+        for name, jumps in zip((*JOINT_NAMES, "the root"), (speeds > 1.0).T, strict=True)
+        if jumps.any()
+    ]
     if errors:
-        raise MotionError(f"{_first_of(errors)}: a jump; cut the clip there, or check frame rate and units")
-
-
-def _first_of(names: Sequence[str]) -> str:
-    return ", ".join(names[:MAX_NAMED]) + f" and {len(names) - MAX_NAMED} more" * (len(names) > MAX_NAMED)
+        first = ", ".join(errors[:MAX_NAMED])
+        raise MotionError(f"jumps, first of {first}; cut the clip there, or check frame rate and units")
 
 
 # From the axes of a file, by the one that is vertical, to ours: with z up (x, y, z) becomes (x, z, -y).
