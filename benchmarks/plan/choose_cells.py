@@ -17,6 +17,7 @@ from benchmarks.plan.study import Part, Study, StudyError, nearest
 from benchmarks.scene import Scene
 from benchmarks.scenes import all_scenes, further_scenes
 from benchmarks.validation.case import METHOD, Case
+from snug.motion.library import LIBRARY
 
 SETS = ("{smoke}", "{short}")  # of cases
 PLACES = re.compile(r"\{(motion|swinging)(?: (\d+))?\}")
@@ -187,8 +188,6 @@ def _check_words(read: ReadStudy) -> None:
 
 def _check_user_scenes(scenes: Sequence[Scene], motions: Motions) -> None:
     """Raise StudyError for a start or a motion that a user's scene names and nobody knows."""
-    from snug.motion.library import LIBRARY  # loads numpy
-
     starts = (*further_scenes(motions.first_garment), *scenes)
     settling = [scene.name for scene in starts if scene.simulated and not scene.start_of]
     for scene in (scene for scene in scenes if scene.declared_in):

@@ -31,6 +31,7 @@ from benchmarks.scenes import GarmentScenes, all_scenes
 from benchmarks.validation.case import Case
 from benchmarks.validation.registry import CASES
 from reference_sim.files.atomic_files import demand_writable_folder
+from snug.motion.library import TRAIN
 
 
 @dataclass(frozen=True)
@@ -165,8 +166,6 @@ def protocol_of(cell: Cell, plan: Plan) -> str:
     network = network_of(cell)
     if network is None or network.users_training:
         return NUMBER
-    from snug.motion.library import TRAIN
-
     trained_on = TRAIN[: plan.preset.train_motions]
     return NUMBER if plan.motions.train == trained_on and not inputs.motions else OWN
 
