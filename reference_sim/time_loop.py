@@ -28,7 +28,6 @@ from reference_sim.trajectory import Trajectory
 if TYPE_CHECKING:
     from reference_sim.obstacle import Obstacle
 
-LEAST_DT, MOST_DT = 1e-7, 1e4  # [s] of a step: beyond, one of its terms is lost in the round-off of the other
 GUESSES = ("previous", "extrapolated", "body_transported")
 # First guess (V, 3) [m] of the end of a step, from its number, 1 for the first, and its start (V, 3) [m]. The
 # first step is asked for again where a start is checked.
@@ -70,8 +69,8 @@ class TimeStepper:
             that of the minimisation without the term, by default "lbfgs", and Newton's method ends the step.
 
     Raises:
-        ValueError: unknown guess, fewer than 1 sub-step, a step of no size, a tolerance that is no number
-            above 0, a function as method beside a term that joins a step late, which Newton's method ends.
+        ValueError: unknown guess, fewer than 1 sub-step, a time step or tolerance that is no number above 0,
+            a function as method beside a term that joins a step late, which Newton's method ends.
     """
 
     def __init__(
@@ -89,8 +88,6 @@ class TimeStepper:
     ) -> None:
         if substeps < 1:
             raise ValueError(f"simulate: substeps = {substeps}: must be at least 1")
-        if 0 < (step := dt / substeps) < LEAST_DT or MOST_DT < step < float("inf"):
-            raise ValueError(f"simulate: dt / substeps = {step:.3g} s: give {LEAST_DT:g} to {MOST_DT:g} s")
         if guess is None:
             guess = "extrapolated" if obstacle is None else "body_transported"
         if not callable(guess) and (

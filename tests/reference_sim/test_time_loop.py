@@ -119,7 +119,6 @@ def test_a_step_that_round_off_excuses_says_so_in_its_frame():
         ({"velocity": np.full_like(SHEET, np.nan)}, "velocity is (49, 3): finite numbers (49, 3) are due"),
         ({"pin_positions": lambda _: np.zeros(3)}, "pin_positions(1) is (3,): finite numbers (0, 3)"),
         ({"dt": 0.0}, "dt = 0.0: must be a finite number above 0"),
-        ({"dt": 1e300}, "dt / substeps = 1e+300 s: give 1e-07 to 10000 s"),
         ({"tolerance": np.nan}, "tolerance = nan: give a finite number above 0"),
         ({"tolerance": -1e-6, "method": "newton"}, "tolerance = -1e-06: give"),
         ({"method": "bfgs"}, "unknown minimiser 'bfgs': choose one of newton, lbfgs"),
