@@ -1,5 +1,5 @@
 from .build import build_report as build_report
-from .figures.figure import Figure as Figure
+from .figures.plotting import Figure as Figure
 from .finished_run import Run as Run
 from .finished_run import read_run as read_run
 from .tables.table import Table as Table

@@ -18,7 +18,7 @@ from reports.figures.charts import (
     energy_series,
     error_of_page_one,
 )
-from reports.figures.figure import Figure, Picture
+from reports.figures.plotting import Figure, Picture
 from reports.finished_run import Run
 from reports.pictures import failures, side_by_side
 from reports.tables.table import Table

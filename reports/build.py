@@ -47,7 +47,7 @@ def build_report(run_dir: str | Path) -> Built:
     """
     # Heavy: not needed for --help.
     from reports.blocks import FIGURES, Report
-    from reports.figures.figure import draw_figures
+    from reports.figures.plotting import draw_figures
     from reports.finished_run import read_run
     from reports.page.write_page import write_page
     from reports.pdf import write_pdf

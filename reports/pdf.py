@@ -18,8 +18,7 @@ import typst
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.files.atomic_files import replacing
 from reports.blocks import BLOCKS, ROWS, Heading, Report, TableBlock
-from reports.figures.figure import Figure, Picture
-from reports.figures.plotting import printable
+from reports.figures.plotting import Figure, Picture, printable
 from reports.finished_run import Run
 from reports.sentences import headline
 from reports.tables.table import DASH, CellText, Column, Table, column_texts, remarks_below
@@ -44,15 +43,6 @@ def _text(value: Any) -> str:
     if isinstance(value, dict):
         return "; ".join(f"{name.replace('_', ' ')} {_text(item)}" for name, item in value.items())
     return ", ".join(map(str, value)) if isinstance(value, list | tuple) else str(value)
-
-
-def moment(text: object) -> datetime | None:
-    """Return an ISO date and time since 1971, or None where it is absent or none."""
-    try:
-        time = datetime.fromisoformat(str(text))
-    except ValueError:
-        return None
-    return time if time.year > 1970 else None
 
 
 Values = dict[str, Any]  # of one block, as JSON takes them
@@ -157,7 +147,7 @@ TEMPLATE = Path(__file__).parent / "report.typ"
 def write_pdf(folder: RunFolder, report: Report) -> Path:
     """Write report.pdf with fonts of the typesetter alone and the run's own date; return its path."""
     config = report.run.config
-    finished = moment(config.get("finished")) or moment(config.get("started"))
+    finished = config.get("finished") or config.get("started")
     values = json.dumps(content(report), ensure_ascii=False, allow_nan=False)
     compiler = typst.Compiler(
         TEMPLATE.read_bytes(),
@@ -166,6 +156,6 @@ def write_pdf(folder: RunFolder, report: Report) -> Path:
         sys_inputs={"content": printable(values)},
     )
     with replacing(folder.report_path) as temporary:
-        stamp = int(finished.timestamp()) if finished else 0
+        stamp = int(datetime.fromisoformat(str(finished)).timestamp()) if finished else 0
         compiler.compile(output=str(temporary), format="pdf", timestamp=stamp)
     return folder.report_path

@@ -17,8 +17,7 @@ import numpy as np
 import pandas as pd
 
 from reference_sim.trajectory import Trajectory
-from reports.figures.figure import Drawing
-from reports.figures.plotting import DOTS, PAGE_WIDTH, file_name, leading, new_figure, wrapped
+from reports.figures.plotting import DOTS, PAGE_WIDTH, Drawing, file_name, leading, new_figure, wrapped
 from reports.finished_run import Run, shown_seeds
 from reports.statistics.outcomes import overstretched
 from reports.tables.table import number

@@ -6,7 +6,7 @@ zero, so its dots stand on the scale of its statistics, arcsinh(x / 1 %).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -15,8 +15,8 @@ import pandas as pd
 
 from benchmarks.metric import Metric
 from benchmarks.results.protocol import SOFTENING
-from reports.figures.figure import Drawing
 from reports.figures.plotting import (
+    Drawing,
     Style,
     arcsinh_axis,
     family_style,
@@ -72,16 +72,22 @@ def curves_of(run: Run, points: Iterable[Point]) -> list[Curve]:
     """
     points = list(points)
     shown = [p for p in points if run.methods[p.method].role != OF_REFERENCE] or points
-    solvers = [point for point in shown if _is_solver(run.methods[point.method])]
-    alone = [point for point in shown if point not in solvers]
-    curves = [_family(run, members) for members in _grouped(run, alone, lambda method: method.family)]
-    for members in _grouped(run, solvers, lambda method: method.base):
-        best, look = front(members), SOLVERS
-        if base := run.methods[members[0].method].base:
-            look = family_style(run, run.methods[members[0].method])
-            look = replace(look, label=f"{run.label(base)} + solver", line=":")
-        curves.append(Curve(best, look, [point for point in members if point not in best]))
-    return curves
+    groups: dict[tuple[bool, str], list[Point]] = {}
+    for point in shown:
+        method = run.methods[point.method]
+        key = (True, method.base) if _is_solver(method) else (False, method.family)
+        groups.setdefault(key, []).append(point)
+    ordered = sorted(groups.items(), key=lambda group: group[0][0])
+    return [_solvers(run, members) if early else _family(run, members) for (early, _), members in ordered]
+
+
+def _solvers(run: Run, members: list[Point]) -> Curve:
+    """Return the curve of solvers stopped early, or of those that start from one method."""
+    best, look = front(members), SOLVERS
+    if base := run.methods[members[0].method].base:
+        look = family_style(run, run.methods[members[0].method])
+        look = replace(look, label=f"{run.label(base)} + solver", line=":")
+    return Curve(best, look, [point for point in members if point not in best])
 
 
 def _family(run: Run, members: list[Point]) -> Curve:
@@ -97,16 +103,6 @@ def _family(run: Run, members: list[Point]) -> Curve:
 
 def _is_solver(method: ReportedMethod) -> bool:
     return method.level is not None and method.role in ("solver", STARTED)
-
-
-def _grouped(
-    run: Run, points: Iterable[Point], key: Callable[[ReportedMethod], str]
-) -> Iterator[list[Point]]:
-    """Yield the points of methods that share a key, in the order of their first."""
-    groups: dict[str, list[Point]] = {}
-    for point in points:
-        groups.setdefault(key(run.methods[point.method]), []).append(point)
-    yield from groups.values()
 
 
 DECADES = 9  # below the largest error; what is smaller is named, not drawn

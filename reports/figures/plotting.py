@@ -1,4 +1,4 @@
-"""Plotting in one look: the style of each method, and files that come out the same every time.
+"""Plotting in one look: the style of each method, figures and their files.
 
 Styles of methods: the same colour and marker in every figure, from family, role and base.
 
@@ -11,17 +11,19 @@ from __future__ import annotations
 import math
 import re
 import zlib
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from reference_sim.files.atomic_files import replacing
 from reports.finished_run import ReportedMethod, Run
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.axis import XAxis, YAxis
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Canvas
     from matplotlib.legend import Legend
 
 Line = str | tuple[float, tuple[float, ...]]  # matplotlib's: a name, or an offset and the dashes [points]
@@ -145,20 +147,20 @@ _LOOK: dict[Any, Any] = {
 }
 
 
-def new_figure(width: float, height: float) -> Figure:
+def new_figure(width: float, height: float) -> Canvas:
     """Make an empty figure [inches] in the look of the report, without pyplot and its global state."""
     import matplotlib
     from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
+    from matplotlib.figure import Figure as Canvas
 
     matplotlib.rcParams.update(_LOOK)
-    figure = Figure(figsize=(width, height), layout="constrained")
+    figure = Canvas(figsize=(width, height), layout="constrained")
     figure.get_layout_engine().set(h_pad=0.04, w_pad=0.03)  # type: ignore[union-attr,call-arg]
     FigureCanvasAgg(figure)
     return figure
 
 
-def new_panels(count: int, columns: int = 1, **more: Any) -> tuple[Figure, list[Axes]]:
+def new_panels(count: int, columns: int = 1, **more: Any) -> tuple[Canvas, list[Axes]]:
     """Make a figure as wide as the page with `count` panels, so many in a line; `fit` gives it its height."""
     columns = min(count, columns)
     lines = -(-count // columns)
@@ -172,7 +174,7 @@ def new_panels(count: int, columns: int = 1, **more: Any) -> tuple[Figure, list[
 
 
 def fit(
-    figure: Figure, entries: Sequence[Style] = (), height: float = PANEL, *, markers: bool = False
+    figure: Canvas, entries: Sequence[Style] = (), height: float = PANEL, *, markers: bool = False
 ) -> None:
     """Draw a legend above the panels, and give the figure the height at which each is so high [inches].
 
@@ -262,7 +264,7 @@ def file_name(text: str) -> str:
     return "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in printable(text))
 
 
-def _legend(figure: Figure, entries: Sequence[Style], columns: int) -> Legend:
+def _legend(figure: Canvas, entries: Sequence[Style], columns: int) -> Legend:
     from matplotlib.lines import Line2D
 
     handles = [
@@ -279,3 +281,68 @@ def _legend(figure: Figure, entries: Sequence[Style], columns: int) -> Legend:
         handletextpad=0.5,
         columnspacing=1.4,
     )
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A drawn figure, the name of its files and its caption; a photograph has no vector graphic."""
+
+    canvas: Canvas
+    name: str
+    caption: str
+    vector: bool = True
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure as it lies on disk: its file for the PDF, caption and share of the page's width."""
+
+    path: Path
+    caption: str
+    width: float
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A figure: its name, with which its files begin, and what draws it, in no part, in one or in several."""
+
+    name: str
+    drawings: Callable[[Run], Iterable[Drawing]]
+
+    def files_in(self, folder: Path) -> list[Path]:
+        """Return its files in the folder of figures."""
+        return sorted(path for path in folder.glob(f"{self.name}*") if path.suffix in (".png", ".svg"))
+
+
+def draw_figures(run: Run, folder: Path, figures: Iterable[Figure]) -> Mapping[str, list[Picture]]:
+    """Draw into the folder all that the run has the data for; return name of the figure -> its pictures.
+
+    What cannot be drawn is taken from the folder if it lies there.
+    """
+    return {
+        figure.name: [save_drawing(folder, drawing) for drawing in figure.drawings(run)]
+        or [kept_picture(path) for path in figure.files_in(folder) if path.suffix == ".png"]
+        for figure in figures
+    }
+
+
+def save_drawing(folder: Path, drawing: Drawing) -> Picture:
+    """Write <name>.png, which holds its caption, and, unless it is a photograph, <name>.svg for the PDF."""
+    canvas, path = drawing.canvas, folder / f"{drawing.name}.png"
+    with replacing(path) as temporary:
+        canvas.savefig(temporary, dpi=DOTS, metadata={"Software": None, "Description": drawing.caption})
+    if drawing.vector:
+        canvas.set_layout_engine("none")  # it has done its work, which is half of the time of a figure
+        with replacing(path.with_suffix(".svg")) as temporary:
+            canvas.savefig(temporary, metadata={"Date": None})
+    return kept_picture(path)
+
+
+def kept_picture(path: Path) -> Picture:
+    """Return the picture that `save_drawing` wrote as this PNG, as vector graphic where it has one."""
+    from PIL import Image
+
+    with Image.open(path) as image:
+        caption, width = image.info.get("Description", ""), image.width / DOTS / PAGE_WIDTH
+    vector = path.with_suffix(".svg")
+    return Picture(vector if vector.is_file() else path, caption, min(1.0, width))

@@ -3,7 +3,7 @@
 import pytest
 
 from reports import pictures
-from reports.figures import figure
+from reports.figures import plotting
 
 DOTS = 40  # of a picture in an inch; 200 in a report
 
@@ -12,5 +12,5 @@ DOTS = 40  # of a picture in an inch; 200 in a report
 def few_dots():
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(pictures, "DOTS", DOTS)
-        patch.setattr(figure, "DOTS", DOTS)
+        patch.setattr(plotting, "DOTS", DOTS)
         yield

@@ -44,9 +44,8 @@ def found(one, other, **options):
     ]
 
 
-@pytest.mark.parametrize(("factor", "verdict"), [(1.3, "worse"), (0.7, "better")])
-def test_a_network_that_moved_beyond_its_seeds_is_found(factor, verdict):
-    assert found(rows_of(), rows_of(1, snug=factor)) == [(verdict, "tshirt", "snug", "energy/strain")]
+def test_a_network_that_is_better_beyond_its_seeds_is_found():
+    assert found(rows_of(), rows_of(1, snug=0.7)) == [("better", "tshirt", "snug", "energy/strain")]
 
 
 def test_what_the_uncertainty_or_2_percent_covers_is_no_change():
@@ -104,16 +103,10 @@ def test_where_zero_is_a_choice_no_change_hangs_on_it():
             assert close == [] and found(heights(0.0, zero), heights(0.03, zero), **options) == moved
 
 
-def test_times_count_beyond_15_percent_repeated_and_beyond_twice_taken_once_on_one_machine():
+def test_repeated_times_count_beyond_15_percent_on_one_machine():
     assert found(rows_of(), rows_of(time=1.15)) == []
     assert found(rows_of(), rows_of(time=1.25)) == [("changed", "flag", "lbfgs-4", "cost/frame")]
     assert found(rows_of(), rows_of(time=1.5), times=False) == []
-    once = [  # several motions are no repeats
-        [row(scene, "lbfgs-4", "cost/frame", factor * (9.0 + i), unit="ms") for i, scene in enumerate(SCENES)]
-        for factor in (1.0, 1.5, 5.0)
-    ]
-    assert found(*once[:2]) == [] and compare(*map(run_of, once[:2])).taken_once == {"lbfgs-4": 1}
-    assert found(once[0], once[2]) == [("changed", "tshirt", "lbfgs-4", "cost/frame")]
     elsewhere = [dataclasses.replace(r, hardware="another") for r in rows_of(time=1.5)]
     assert found(rows_of(), elsewhere) == []
 

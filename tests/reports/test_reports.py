@@ -14,7 +14,7 @@ from benchmarks.provenance import digest_of_file
 from benchmarks.results.run_folder import FORMAT, RunFolder
 from reports import build
 from reports.blocks import FIGURES
-from reports.figures.figure import draw_figures
+from reports.figures.plotting import draw_figures
 from reports.finished_run import make_run, read_run
 from reports.statistics.means_and_spreads import Mean
 from reports.tables import make_tables

@@ -18,9 +18,6 @@ def test_methods_keep_their_order_and_their_look():
     assert plotting.style(run, "newton-2").label == "Newton, 2 iterations"
     assert plotting.style(run, "newton-2").colour == plotting.style(run, "newton-16").colour
     assert plotting.style(run, "newton-2").line != plotting.style(run, "newton-8").line
-    assert plotting.style(run, "zebra") == plotting.style(run_of([row(method="zebra")]), "zebra")
-    colours = [look.colour for look in plotting.KNOWN.values() if look.colour]
-    assert len(set(colours)) == len(colours)
 
 
 def test_what_starts_from_a_method_has_its_colour_and_an_ablation_its_marker():
@@ -30,10 +27,6 @@ def test_what_starts_from_a_method_has_its_colour_and_an_ablation_its_marker():
     )
     assert warm.colour == cleaned.colour == base.colour != less.colour
     assert less.marker == base.marker and warm.marker != base.marker
-    family = plotting.family_style(run, run.methods["snug+lbfgs-4"])
-    assert (family.label, warm.label) == ("SNUG + L-BFGS", "SNUG + L-BFGS, 4 iterations")
-    alone = run_of([row(method="snug+cleanup")])  # what it starts from did not run
-    assert plotting.style(alone, "snug+cleanup").label == "SNUG, cleaned up"
 
 
 def test_a_dot_stands_for_each_motion_and_seed():

@@ -13,12 +13,10 @@ from matplotlib.legend import Legend
 from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
-from reference_sim import Trajectory
 from reports.blocks import FIGURES
-from reports.figures.figure import Drawing
-from reports.figures.plotting import PAGE_WIDTH
-from reports.finished_run import RollOuts, Run
-from tests.reports.report_folder import mesh, row, run_of, sheet
+from reports.figures.plotting import PAGE_WIDTH, Drawing
+from reports.finished_run import Run
+from tests.reports.report_folder import row, run_of
 
 LEAST = 4.0  # [cm] that a panel is wide and high on paper
 PRINTED = 17.0 / 2.54 / PAGE_WIDTH  # inches on paper of an inch of a figure as wide as the page
@@ -37,25 +35,6 @@ LABELS = {
 }  # fmt: skip
 SCENES = ("tshirt/01_01_a", "tshirt/push_recovery", "tshirt/sit_and_stand", "tshirt/cartwheel_lean")
 FRAMES = 40
-
-
-class Kept(RollOuts):
-    """A roll-out for every method of every scene, with all curves that figures read."""
-
-    def cloth(self, scene: str, method: str, seed: int) -> Trajectory:
-        points, faces = sheet(0.1)
-        place = list(ROLES).index(method) if method in ROLES else 0
-        swing = np.linspace(0.0, 6.0, FRAMES) + place
-        points = np.repeat(points[:1], FRAMES, axis=0)
-        points[..., 2] += 0.01 * (1 + place) * np.sin(points[..., 0] * swing[:, None])
-        fields = {f"energy/{term}": 0.1 * (1.1 + np.sin(swing)) for term in ("strain", "bending", "inertia")}
-        return mesh(points, faces, fields)
-
-    def body(self, scene: str) -> Trajectory:
-        points, faces = sheet(0.0)
-        moving = np.repeat(points[:1], FRAMES, axis=0)
-        moving[:10] += 0.01 * np.arange(10, 0, -1)[:, None, None]
-        return mesh(moving, faces, {})
 
 
 def rows_of_all():
@@ -91,22 +70,20 @@ def run() -> Run:
     ]
     columns = ["scene", "method", "seed", "seconds", "strain", "bending", "inertia"]
     energies = pd.DataFrame(lines, columns=columns)
-    return replace(run, roll_outs=Kept(), frame_energies=energies)
+    return replace(run, frame_energies=energies)
 
 
 @pytest.fixture(scope="module")
 def drawings(run) -> list[Drawing]:
-    drawn = {figure.name: list(figure.drawings(run)) for figure in FIGURES}
-    assert all(drawn.values()), "a figure is not drawn"
-    return list(itertools.chain(*drawn.values()))
+    return [drawing for figure in FIGURES for drawing in figure.drawings(run)]
 
 
 def test_panels_of_fifteen_methods_are_at_least_four_centimetres_wide_and_high(drawings):
-    assert len(ROLES) == 15
+    assert len(ROLES) == 15 and len(drawings) == 3
     for drawing in drawings:
         FigureCanvasAgg(drawing.canvas).draw()
         scale = 2.54 * min(PRINTED, 17.0 / 2.54 / drawing.canvas.get_figwidth()) / drawing.canvas.dpi
-        for axes in drawing.canvas.axes if drawing.vector else ():
+        for axes in drawing.canvas.axes:
             width, height = (scale * length for length in axes.get_window_extent().bounds[2:])
             assert min(width, height) >= LEAST, f"{drawing.name}: a panel of {width:.1f} x {height:.1f} cm"
 
@@ -117,7 +94,7 @@ def test_no_text_covers_another_or_a_panel_and_all_are_inside_the_figure(drawing
         FigureCanvasAgg(canvas).draw()
         beside, written = texts(canvas)
         legends = [("legend", inner(legend)) for legend in canvas.legends]
-        panels = [axes.get_window_extent() for axes in canvas.axes if drawing.vector]
+        panels = [axes.get_window_extent() for axes in canvas.axes]
         outer = [(text.get_text(), inner(text)) for text in beside] + legends
         assert not [name for name, box in outer if any(map(box.fully_overlaps, panels))], drawing.name
         boxes = [*outer, *((text.get_text(), inner(text)) for text in written)]
@@ -142,6 +119,6 @@ def texts(canvas) -> tuple[list[Text], list[Text]]:
         for axis in (axes.xaxis, axes.yaxis):
             low, high = sorted(axis.get_view_interval())
             ticks = [tick for tick in axis.get_major_ticks() if low <= tick.get_loc() <= high]
-            around += [axis.label, *(tick.label1 for tick in ticks)] if axes.axison else []
+            around += [axis.label, *(tick.label1 for tick in ticks)]
     written = [text for axes in canvas.axes for text in axes.texts]
     return tuple([t for t in some if t.get_visible() and t.get_text().strip()] for some in (around, written))

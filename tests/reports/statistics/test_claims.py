@@ -199,13 +199,6 @@ def test_one_seed_few_motions_or_another_failure_do_not_make_a_method_worse(moti
     assert told([*rows, ended]) == {}
 
 
-def test_a_method_without_seeds_diverges_with_none():
-    metric = {"metric": "curvature/error", "unit": "1/m"}
-    gone = seeds("snug-no-strain", (None,), **GONE | {"seeded": False})
-    line = told([*seeds("snug", (1.0, 1.1), **metric), *gone])["curvature/error", "snug", "snug-no-strain"]
-    assert (line.verdict, line.remark) == ("holds", ": the second diverged")
-
-
 def frame_table(**methods):
     """Lines of frame_energies.csv: method -> strain of the frames of seeds 0 and 1 of each motion."""
     lines = [
