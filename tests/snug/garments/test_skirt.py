@@ -44,7 +44,6 @@ def test_a_skirt_fits_waist_and_hips_and_has_two_even_rims(body, skirt):
     points = skirt.rest_positions
     assert np.array_equal(skirt.pins, np.sort(skirt.loops["waist"]))
     distance = igl.signed_distance(points, body.template, body.faces)[0]
-    assert distance.min() >= skirt.parameters["clearance"] - 1e-9
     waist, hem = (points[skirt.loops[name]] for name in ("waist", "hem"))
     hip, knee = (body.joint_template[body.joint_names.index(n), 1] for n in ("left_hip", "left_knee"))
     assert np.ptp(waist[:, 1]) < 1e-4 and np.ptp(hem[:, 1]) < 1e-4 and knee < hem[0, 1] < hip < waist[0, 1]

@@ -107,13 +107,6 @@ def test_a_rate_is_said_once(tmp_path):
     refuse(clip, "no frame rate; add ,fps=N")
 
 
-def test_files_of_a_subjects_shape_are_left_out_of_a_folder(tmp_path):
-    write(tmp_path / "walk.npz", WALK)
-    for name in ("shape.npz", "neutral_stagei.npz"):
-        np.savez(tmp_path / name, betas=np.zeros(10))
-    assert [motion.name for motion in load_motions(tmp_path)] == ["walk"]
-
-
 @pytest.mark.parametrize(
     ("turn", "up", "words"),
     [
