@@ -167,19 +167,10 @@ def test_a_metric_nobody_heard_of_makes_its_own_table(tmp_path):
     rows = [*all_rows(), row(SCENES[0], "snug", "sound/volume", 60.0, unit="dB")]
     config = declaration(rows)
     config["metrics"]["sound/volume"] |= {"table": "acoustics", "title": "Volume"}
-    rows.append(row(SCENES[0], "snug", "energy/heat", 5.0))
-    config["metrics"]["energy/heat"] = {
-        "unit": "J",
-        "title": "Heat",
-        "table": "energies",
-        "definition": "warmth",
-    }
     tables = make_tables(make_run(config, rows))
     assert tables["acoustics"].rows == (("tshirt", "snug", Mean(60.0, None, 1, 1)),)
     tables["acoustics"].write_csv(tmp_path)
     assert read_csv(tmp_path / "acoustics.csv")[0]["sound/volume [dB]"] == "60"
-    (heat,) = (column for column in tables["energies"].columns if column.name == "energy/heat")
-    assert (heat.title, heat.unit) == ("Heat", "J")
 
 
 def test_times_of_several_machines_are_named():

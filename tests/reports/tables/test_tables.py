@@ -7,7 +7,7 @@ import pytest
 
 from reports.pdf import lay_out_table
 from reports.statistics.means_and_spreads import Mean, mean_of, pair
-from reports.tables import make_tables, table
+from reports.tables import make_tables
 from tests.reports.report_folder import SCENES, row, run_of
 
 
@@ -67,9 +67,6 @@ def test_a_check_that_must_be_exact_is_no_tolerances_away_or_infinitely_many():
     assert block["groups"][0]["rows"][2][column(table, "away")]["text"] == "∞"
 
 
-# --- ablations ----------------------------------------------------------------------------------------------
-
-
 def on_two_scenes(method, *values, metric="energy/total"):
     return [row(scene, method, metric, value) for scene, value in zip(SCENES, values)]
 
@@ -81,21 +78,3 @@ def test_pairs_share_their_scenes_or_have_their_own():
     apart = [row(SCENES[0], metric="energy/total"), row(SCENES[1], "pbns", "energy/total")]
     assert pair(run_of(apart).frame, "snug", "pbns", "energy/total") == (None, None)
     assert pair(run_of(rows[:2]).frame, "snug", "pbns", "energy/total")[0].value == 5.0
-
-
-# --- numbers ------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [
-        (-0.5, "−0.500"),
-        (0.0, "0"),
-        (9.996, "10.0"),
-        (3.2e9, "3.20×10⁹"),
-        (float("nan"), "–"),
-        (float("inf"), "–"),
-    ],
-)
-def test_numbers_as_text(value, text):
-    assert table.number(value) == text
