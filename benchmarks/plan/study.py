@@ -6,9 +6,10 @@ Every field is an attribute of a dataclass, whose type says what it takes.
 from __future__ import annotations
 
 import difflib
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field, fields, is_dataclass, replace
+from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from types import UnionType
 from typing import Any, Literal, NoReturn, TypeVar, get_args, get_origin, get_type_hints
@@ -201,6 +202,24 @@ def find_study(name: str) -> Path:
     )
 
 
+def located(message: str, study: str, words: Sequence[str]) -> str:
+    """Return the message of a faulty field behind the file and line of the study that give it.
+
+    A field within a table on one line has that line; one that the words of the command line give has none.
+    """
+    field = message.partition(":")[0]
+    given = {word.partition("=")[0].lstrip("-").replace("-", "_") for word in words}
+    if field in given or not re.fullmatch(r"[\w.]+", field):
+        return message
+    path, lines, header = find_study(study.partition(":")[0]), dict[str, int](), ""
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        name = re.split("[=#]", line)[0].replace('"', "").strip()
+        header = name.strip("[] ") if name.startswith("[") else header
+        lines.setdefault(header if name.startswith("[") else ".".join(filter(None, (header, name))), number)
+    place = lines.get(field) or lines.get(field.rpartition(".")[0])
+    return f"{path}: line {place}: {message}" if place else message
+
+
 def study_names() -> list[str]:
     """Return the names of the package's studies, and of those with code that lie beside it."""
     with_code = {path.parent.name: None for folder in FOLDERS for path in sorted(folder.glob(f"*/{FILE}"))}
@@ -304,6 +323,9 @@ def _dataclass_of(kind: Any, table: Any, field: tuple[str, ...] = ()) -> Any:
         if name not in declared:
             near = nearest(name, declared, otherwise=f"there are {', '.join(declared)}")
             _refuse((*field, name), f"no field is called '{name}'; {near}")
+    for f in fields(kind):
+        if f.default is MISSING and f.default_factory is MISSING and f.name not in table and not base:
+            _refuse(field, f"{f.name} is absent: give it")
     hints = get_type_hints(kind)
     try:
         table = _merged(asdict(find_preset(base)), table) if base else table
