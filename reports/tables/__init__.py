@@ -47,8 +47,7 @@ def make_tables(run: Run) -> dict[str, Table]:
 
 def write_tables(folder: Path, tables: Iterable[Table]) -> None:
     """Write a CSV file of each table, in place of those of an earlier report."""
-    for pattern in ("*.csv", "*.tex"):  # earlier versions wrote LaTeX too
-        for path in folder.glob(pattern):
-            path.unlink()
+    for path in folder.glob("*.csv"):
+        path.unlink()
     for table in tables:
         table.write_csv(folder)

@@ -68,14 +68,12 @@ EXCESS_NOTE = (
 def relative_excess(run: Run) -> list[Table]:
     """Tabulate the relative excess of each method over the motions of a garment."""
     lines: list[tuple[Cell, ...]] = []
-    for garment, method, excess in _measured(run):
-        worst, most = excess.worst
-        stands = standing(excess.effect, excess.effect.p_value()) + untested(excess.effect)
-        lines.append((
-            garment, method, excess.effect, excess.typical_of(recorded=True),
-            excess.typical_of(recorded=False), excess.pooled, excess.mean, most,
-            worst.partition("/")[2] or worst, excess.uncertainty or None, len(excess.by_motion), stands,
-        ))  # fmt: skip
+    zero = {*run.with_role("reference", "reference-variant"), SKINNING}
+    for garment in run.garments(run.garment_rows):
+        rows = with_relative_excess(run, run.garment_rows[run.garment_rows["garment"] == garment])
+        for method in run.ordered(set(rows[rows["usable"]]["method"]) - zero):
+            if excess := excess_of(run, rows, method):
+                lines.append((garment, method, *_cells_of(excess)))
     columns = (
         GARMENT, METHOD, Column("typical", "Typical", "%", digits=2),
         Column("recorded", "Recorded", "%", digits=2), Column("others", "Others", "%", digits=2),
@@ -92,16 +90,15 @@ def relative_excess(run: Run) -> list[Table]:
     return table("relative_excess", columns, lines, caption, grouped_by=("garment",), note=EXCESS_NOTE)
 
 
-def _measured(run: Run) -> list[tuple[str, str, Excess]]:
-    """Return (garment, method, excess) of each method but skinning, the reference and its variants."""
-    excesses = []
-    for garment in run.garments(run.garment_rows):
-        rows = with_relative_excess(run, run.garment_rows[run.garment_rows["garment"] == garment])
-        zero = {*run.with_role("reference", "reference-variant"), SKINNING}
-        for method in run.ordered(set(rows[rows["usable"]]["method"]) - zero):
-            if excess := excess_of(run, rows, method):
-                excesses.append((garment, method, excess))
-    return excesses
+def _cells_of(excess: Excess) -> tuple[Cell, ...]:
+    """Return the cells of a method in table relative_excess."""
+    worst, most = excess.worst
+    stands = standing(excess.effect, excess.effect.p_value()) + untested(excess.effect)
+    return (
+        excess.effect, excess.typical_of(recorded=True), excess.typical_of(recorded=False), excess.pooled,
+        excess.mean, most, worst.partition("/")[2] or worst, excess.uncertainty or None,
+        len(excess.by_motion), stands,
+    )  # fmt: skip
 
 
 def _error_title(metric: Metric) -> str:
