@@ -46,7 +46,6 @@ BREACHES = {  # a line of run(): what is said of it
     "x[2:, -1] += np.random.default_rng().random(3)": "a second run gives other positions",
     "x[2:, -1] += self.seed": "another seed gives other positions, by 1 m: say seeded=True",
     "x = self.__dict__.setdefault('x', x)": "each call of run() has to do all of the work",
-    "m = scene.cloth.masses; m.flags.writeable = True; m[0] *= 2": "alters the scene: cloth.masses: copy",
     "raise RuntimeError('broken on\\npurpose')": "RuntimeError: broken on purpose (",
 }
 JUDGED = """
@@ -59,13 +58,11 @@ TWICE, ARRAY = "-2.0 * self.cloth.masses[:, None] *", METRIC_FILE.replace("float
 FILES = {  # a file: what is wrong with it
     METHOD_FILE: "",
     METHOD_FILE.replace('"solver"', '"solver", other_mesh=True').replace("pass", FINER): "",
-    METHOD_FILE.replace("*, models, seed", "*, models"): "TypeError",
     **{METHOD_FILE.replace("pass", line): fault for line, fault in BREACHES.items()},
     SCENE_FILE: "",
     SCENE_FILE.replace("-self.cloth.masses[:, None] *", TWICE): "lift: its gradient is not the derivative",
     METRIC_FILE: "",
     "import numpy\n" + METRIC_FILE.replace("float(", "numpy.float32("): "",  # as a run takes it
-    METRIC_FILE + JUDGED + "None": "",
     METRIC_FILE + JUDGED + "('diverged', 'lost')": "",
     METRIC_FILE + JUDGED + "'lost'": "ValueError: judge() gives 'lost': expected None, or a status",
     ARRAY.replace(".max())", ".max(axis=1)"): "TypeError: height/highest is array(",
@@ -98,19 +95,6 @@ def test_a_method_is_checked_in_three_scenes_and_one_that_is_bound_to_a_mesh_whe
     assert check.main([file(METHOD_FILE.replace("self.scene = scene", f"{bound}; self.scene = scene"))]) == 1
     out = capsys.readouterr().out
     assert out.count("bound to 49 vertices") == 3 and "still in tshirt/kick: wrong" in out
-
-
-@pytest.mark.parametrize(
-    ("text", "options", "message"),
-    [
-        ("", (), "declares none of METHODS, SCENES, METRICS"),
-        (METRIC_FILE, IN_SHEET, "declares none of METHODS"),
-        (METHOD_FILE.replace('"still"', '"snug"'), (), "method 'snug' is declared twice"),
-        (METHOD_FILE, ("--scene", "hanging"), "unknown scene 'hanging'"),
-    ],
-)
-def test_the_check_refuses_what_a_run_refuses(text, options, message, file, refused):
-    refused(message, check.main, [file(text), *options])
 
 
 @pytest.mark.parametrize(("factor", "fine"), [(1.0, True), (0.999, False)])

@@ -77,18 +77,6 @@ def test_a_users_file_counts_with_the_modules_beside_it_and_all_that_is_installe
     assert list(imported_beside(str(home))) == ["deep", "helper"]
 
 
-@pytest.mark.parametrize("folder", ["", "site-packages"])
-def test_a_file_in_a_package_counts_with_it_and_one_installed_without_what_lies_beside(home, folder):
-    root = home.parent / folder
-    solver = str(root / "deep" / "inner" / "solver.py")
-    before = software(solver)
-    write(root, "helper.py", "CHANGED = True\n")
-    assert (software(solver) == before) is bool(folder)
-    before = software(solver)
-    write(root, "deep/__init__.py", "CHANGED = True\n")
-    assert software(solver) != before
-
-
 # What tasks import and what decides no result: names, files and their formats, origin, sizes that are inputs.
 CARRYING = (
     "benchmarks/plan/cell.py", "benchmarks/declarations.py",
@@ -128,23 +116,6 @@ def test_what_a_task_declares_holds_all_that_it_imports(task):
             elif DISTRIBUTION.get(top, top) not in {*PACKAGES, *NOT_COMPUTING, *sys.stdlib_module_names}:
                 missing.add(f"{path} imports {top}")
     assert not missing, "\n".join(sorted(missing))
-
-
-@pytest.mark.parametrize(
-    ("path", "stale"),
-    [
-        ("reference_sim/minimise/newton.py", set(TASKS)),
-        ("snug/training/train_network.py", set(TASKS)),
-        ("benchmarks/metrics/curvature.py", {"metrics", "case"}),
-        ("benchmarks/scenes/sheets.py", set(TASKS)),
-        ("benchmarks/plan/plan.py", set()),
-        ("benchmarks/runner/schedule.py", set()),
-        ("reports/build.py", set()),
-    ],
-)
-def test_a_change_makes_stale_what_it_may_move(path, stale):
-    files = {task: {f for place in code for f in files_of(place)} for task, code in TASKS.items()}
-    assert {task for task in files if provenance.ROOT / path in files[task]} == stale
 
 
 def test_digests_tell_values_apart():

@@ -61,7 +61,6 @@ def test_a_run_that_fails_or_is_of_another_commit_is_left(tmp_path, monkeypatch,
     "suite, status, config, usable",
     [
         ("garments", "stalled", {"finished": "now"}, True),
-        ("extremes", "diverged", {"finished": "now"}, True),
         ("garments", "diverged", {"finished": "now"}, False),
         ("garments", "ok", {"finished": None}, False),
         ("garments", "ok", {"finished": "now", "tasks": {"training": {"snug": {"failed": "?"}}}}, False),
@@ -77,20 +76,6 @@ def test_a_run_counts_where_it_ended_and_simulations_stalled_at_worst(
     folder.write_rows([Row(*what, status=status, reason=reason, value=1.0)])
     folder.write_config(config)
     assert all_usable(folder) == usable
-
-
-def test_the_command_refuses_what_no_commit_has_and_goes_on_after_a_run_that_fails(monkeypatch, capsys):
-    def without_picture(name, *_):
-        raise ResultsError(f"{name}/figures/none.png: not there")
-
-    monkeypatch.setattr(command, "publish", without_picture)
-    for head, names, status, error in (
-        ("abc+changes", ["quick"], 2, "commit the changes first"),
-        ("abc", ["smoke"], 2, "study smoke: has no [show]"),
-        ("abc", ["quick", "shapes"], 1, "shapes: shapes/figures/none.png: not there; not published"),
-    ):
-        monkeypatch.setattr(command, "commit", lambda head=head: head)
-        assert command.main(names) == status and error in capsys.readouterr().err
 
 
 @pytest.mark.slow

@@ -11,24 +11,8 @@ from benchmarks import run
 from benchmarks.methods import METHODS
 from benchmarks.plan.plan import make_plan
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.validation.registry import KNOWN_ANSWERS, STRESS_TESTS
 from reference_sim.files.array_file import read_arrays
 from tests.benchmarks.plan.planned import planned
-
-
-def test_the_help_names_every_exit_status(capsys):
-    with pytest.raises(SystemExit):
-        run.main(["--help"])
-    help_text = capsys.readouterr().out.partition("exit status: ")[2]
-    assert all(f"{status} when " in help_text for status in (0, 1, 2, 130))
-
-
-def test_the_list_names_everything(capsys):
-    assert run.main(["--list"]) == 0
-    listing = capsys.readouterr().out
-    names = [m.name for m in METHODS] + [c.name for c in (*KNOWN_ANSWERS, *STRESS_TESTS)]
-    for name in [*names, "tshirt/", "garments", "paper", "walk"]:
-        assert name in listing
 
 
 def test_the_list_has_the_scenes_that_the_study_measures(capsys):

@@ -80,22 +80,6 @@ def test_an_answer_that_was_kept_from_the_first_run_is_found():
     assert clocked(lambda: kept, of=positions_of)[1].complaint == ""
 
 
-def test_a_thread_that_goes_on_is_found():
-    positions, stop = np.zeros((2, 3, 3)), threading.Event()
-
-    def run():
-        def fill():
-            while not stop.is_set():
-                positions[1] += 1.0
-
-        threading.Thread(target=fill, daemon=True).start()
-        return positions
-
-    _, reading = clocked(run, of=positions_of)
-    stop.set()
-    assert "still changed" in reading.complaint
-
-
 @pytest.mark.parametrize("pause", [0.0, 0.01])
 def test_a_thread_that_only_computes_or_only_waits_is_found_too(pause):
     stop = threading.Event()

@@ -90,17 +90,6 @@ def divided(files=(), **fields):
     return split_motions(study_with(**fields), files)
 
 
-def test_sizes_quick_have_eight_motions_paper_all_and_either_those_that_are_named():
-    everything, named = divided().measured, ["kick", "punch", "walk", "bow"]
-    assert len(everything) == 8
-    assert {*everything} < {*divided(sizes="paper").measured} and len(divided(sizes="paper").measured) == 22
-    cells = planned("full:garments", "--methods", "simulation").cells
-    assert {cell.scene.motion for cell in cells if cell.scene.part == "whole"} == set(everything)
-    assert {*divided(test_motions=named).measured} == {*named}
-    assert {*divided(split="validation", validation_motions=named).measured} == {*named}
-    assert len(divided(split="validation", test_motions="walk").measured) == 8
-
-
 def test_what_no_part_lists_is_met_by_its_whole_name():
     clip, whole = "tunic/twist_stop@clip", "tshirt/twist_stop"
     met = {(cell.scene.name, cell.suites) for cell in planned("--scenes", f"{clip},{whole}").cells}
@@ -111,6 +100,7 @@ def test_what_no_part_lists_is_met_by_its_whole_name():
 def test_motions_are_divided_as_help_says():
     from snug.motion.library import TEST, TRAIN, VALIDATION
 
+    assert len(divided(sizes="paper").measured) == 22
     library = divided()
     assert (library.train, library.validation, library.test) == (TRAIN, VALIDATION, TEST)
     assert library.files == () and library.measured == TEST[:8]

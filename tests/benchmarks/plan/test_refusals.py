@@ -14,48 +14,29 @@ FIELDS = [  # study.toml -> line, field, and what is near it
     ("seeds = [", "not readable as TOML"),
     ("sedes = [0]", "study.toml: line 1: sedes: no field is called 'sedes'; did you mean seeds"),
     ("question = 1", "question: 1: give text"),
-    ("\nseeds = ['a']", "study.toml: line 2: seeds: 'a': give a whole number"),
     ("seeds = [-1]", "seeds: '-1': give at least one whole number"),
     ("split = 'tset'", "split: 'tset': choose from test, validation"),
-    ("body = 3", "body: 3: give a path"),
     ("sizes = 'huge'", "sizes: unknown preset 'huge'; choose from smoke, quick, paper"),
     ("[sizes]\nbase = 'smoke'\nframe = 3", "study.toml: line 3: sizes.frame: no field is called 'frame'"),
     ("[parts.garmnts]", "study.toml: line 1: parts.garmnts: no part is called so; choose from garments, "),
     ("[parts.speed]\nscenes = ['flagg']", "study.toml: line 2: parts.speed.scenes: unknown scene 'flagg'"),
-    ("[parts.speed]\nmethods = ['sung']", "parts.speed.methods: unknown method 'sung'; did you"),
-    ("[parts.validation]\ncases = ['patch']", "parts.validation.cases: unknown case 'patch'"),
     ("garment = { units = 'cm' }", "study.toml: line 1: garment: path is absent: give it"),
-    ("garment = { path = 'a b.obj' }", "'a b' cannot name scenes"),
     ("garment = { path = 'tshirt.obj' }", "the project has scenes of that name: give the file another"),
-    (
-        "[rollouts]\nm = { path = 'a', unit = 'cm' }",
-        "study.toml: line 2: rollouts.m.unit: no field is called 'unit'",
-    ),
-    ("like = 'study.toml'", "is like itself"),
-    ("[show]\nfilms = 'a.gif'", "show.films: 'a.gif': give a table"),
 ]
 WORDS = [
     ("dfault", "no study 'dfault': name one, or a file or folder with study.toml; did you mean default"),
-    ("full:garment", "study full: no part 'garment'; it has garments, speed"),
     ("default:shapes", "no such scene meets such a method in part shapes"),
-    ("--set seeds", "--set seeds: give field=value"),
     ("--set sizes.frames=2", "sizes.frames: 2: give 3 or more"),
-    ("--rollout mine", "mine: give NAME=FILE"),
     ("--scenes hanging_sheets", "did you mean hanging_sheet"),
     ("--scenes tshirt/walk", "see test_motions"),
     ("--methods sung", "did you mean snug"),
-    ("--test-motions wlak", "did you mean walk"),
     ("--motions broken.npz", "broken.npz"),
     ("--motions back.npz,up=z", "stands along z in 0 % of the frames only"),
-    ("--out broken.npz", "is a file"),
     ("--out full", "holds no run"),
     ("--out torn", "torn/run.json: not readable"),
-    ("--workers 0", "1 or more"),
     ("--trained none", "no such folder"),
     ("--trained folder --scheduler tcp://there", "leave out --scheduler"),
-    ("--frobnicate", "--frobnicate"),
     ("--methods gone.py", "gone.py: no such file"),
-    ("--set metrics=energy", "energy: is no file"),
     ("--set metrics=twice.py", "metric 'energy/total' is declared twice, by the project itself and by "),
     ("--set metrics=bare.py", "metric 'mine/x' has no unit"),
     ("--scenes worn.py", "no garment is called 'toga'; there are tshirt, "),
@@ -73,27 +54,20 @@ def entry(fields: str, after: str = MAKE) -> str:
 
 METHOD_FILES = [
     ("x = 1\ny = )\n", "bad.py: line 2: unmatched ')'"),
-    ("METHODS = (1,)\n", "bad.py: declares no METHODS, a tuple of MethodEntry"),
     ("METHODS = ()\n", "bad.py: declares no METHODS"),
     ("def f():\n    return 1 / 0\nf()\n", "bad.py: line 2: ZeroDivisionError: division by zero"),
-    ("import sys\nsys.exit(3)\n", "bad.py: line 2: SystemExit: 3"),
     (entry('name="a", lable="b"'), "bad.py: line 2: TypeError"),
     (entry(PLAIN, ""), "bad.py: has no function make"),
-    (entry(PLAIN + ', module="no.where"'), "method 'a': no module no.where"),
     (entry(PLAIN + ', files=("gone.pt",)'), "gone.pt: no such file"),
-    (entry(PLAIN + ', files="gone.pt"'), "files='gone.pt': give a tuple of strings"),
     (entry(PLAIN + ', options={"at": open}'), "method 'a': cannot tell"),
     (entry(PLAIN + ', trained="zz"'), "no training is called 'zz'"),
     (entry('name="a b", description="c"'), "method 'a b': name it by at most 150 letters"),
     (entry('name="snug", description="c"'), "method 'snug' is declared twice, by the project itself and by "),
     (HEAD + "METHODS = tuple(MethodEntry(name=n, description='b') for n in ('a/b', 'a-b'))\n" + MAKE,
      "free_fall x a-b and free_fall x a/b would have the same files: rename one"),
-    ("\udcff", "bad.py: line 1: (unicode error) 'utf-8' codec can't decode"),
 ]  # fmt: skip
 SCENE_FIELDS = [
     ('metrics=("energies",)', "scene 'lift': metrics=('energies',): choose from "),
-    ('metrics="energy"', "scene 'lift': metrics='energy': give a tuple of strings"),
-    ('start_of="free_fal"', "scene 'lift': start_of='free_fal': nothing that serves is called so; "),
     ('start_of="lift"', "scene 'lift': start_of='lift': nothing that serves"),
     ('garment="tshirt", motion="wlak"', "motion='wlak': nothing that serves is called so; did you mean"),
 ]
@@ -132,7 +106,7 @@ def test_a_wrong_word_is_refused_by_its_option(words, message, folder, refused):
 
 @pytest.mark.parametrize(("text", "message"), METHOD_FILES)
 def test_a_file_that_cannot_be_meant_is_one_line(text, message, folder, refused):
-    (folder / "bad.py").write_text(text, errors="surrogateescape")
+    (folder / "bad.py").write_text(text)
     refused(message, run.main, ["--scenes", "free_fall", "--methods", "bad.py", "-o", "out"])
 
 

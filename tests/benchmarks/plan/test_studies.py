@@ -12,8 +12,7 @@ from benchmarks.plan.study import parse_setting, read_study, study_names
 from benchmarks.presets import find_preset
 from benchmarks.publish import published_studies
 from reports.blocks import FIGURES
-from snug.trained import FOLDER
-from tests.benchmarks.plan.planned import planned, study_with
+from tests.benchmarks.plan.planned import planned
 
 MINE = """question = "Does it fall?"
 like = "smoke"
@@ -73,19 +72,13 @@ def test_options_hold_before_the_file_and_their_paths_are_relative_to_where_one_
     ("text", "table"),
     [
         ("seeds=0,1", {"seeds": [0, 1]}),
-        ("test_motions=a,b", {"test_motions": ["a", "b"]}),
         ("sizes=smoke", {"sizes": "smoke"}),
-        ('parts.speed.scenes=["flag"]', {"parts": {"speed": {"scenes": ["flag"]}}}),
         ("rollouts.mine=a.npz", {"rollouts": {"mine": "a.npz"}}),
         ("motions=clips/a b", {"motions": "clips/a b"}),
     ],
 )
 def test_a_setting_is_a_field_and_a_value_of_toml_or_a_word(text, table):
     assert parse_setting(text) == table
-
-
-def test_trained_true_means_the_networks_of_the_package():
-    assert study_with(trained=True).trained == FOLDER and study_with(trained=False).trained is None
 
 
 @pytest.mark.parametrize("name", study_names())

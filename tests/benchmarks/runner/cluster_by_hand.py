@@ -108,8 +108,6 @@ def work(name: str, seed: int, how: str, mark: str, sleep: float, context: Conte
             file.write(f"{worker()} {os.getpid()}\n")
     if how == "raise":
         raise ValueError("broken on purpose")
-    if how == "die":
-        os.kill(os.getpid(), signal.SIGKILL)
     if how == "die with the worker":
         os.kill(worker(), signal.SIGKILL)
         time.sleep(60)

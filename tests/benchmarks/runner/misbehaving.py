@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import threading
 import time
 from pathlib import Path
@@ -10,7 +9,6 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.method import Method
-from benchmarks.runner.task import Outcome
 from reference_sim.trajectory import Trajectory
 
 
@@ -31,8 +29,6 @@ class Misbehaving(Method):
         getattr(self, f"_{self.how}", lambda _: None)(still)
         if self.how == "late":  # a frame too many
             still = np.concatenate([still[:1], still])
-        if self.how == "narrow":  # a vertex too few
-            still = still[:, 1:]
         return Trajectory(
             positions=still, faces=np.asarray(scene.cloth.faces), times=np.arange(len(still)) * scene.dt,
             frame_seconds=np.full(len(still), 1e-6), status="ok",
@@ -72,8 +68,3 @@ class Misbehaving(Method):
 
 def make(*, models: Path, seed: int, how: str) -> Misbehaving:
     return Misbehaving(how)
-
-
-def loaded_modules(context, needed) -> Outcome:
-    """A task that tells what its process has loaded."""
-    return Outcome(result={"names": set(sys.modules)})

@@ -40,7 +40,6 @@ def rows(runner: Runner, plan: Plan) -> dict[str, Row]:
         ("early", "its time cannot be believed"),
         ("unheld", "OSError: no room left"),
         ("late", "run() gives positions float64 (5, 16, 3): floats (4, 16, 3) are due"),
-        ("narrow", "run() gives positions float64 (4, 15, 3): floats (4, 16, 3) are due"),
         ("astray", "quasi_static() gives positions float64 (4, 2, 3)"),
     ],
 )

@@ -13,8 +13,7 @@ from benchmarks.method import Training
 from benchmarks.methods import find_method
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
-from benchmarks.plan.plan import Network, Plan, check_machines
-from benchmarks.plan.study import Study, StudyError
+from benchmarks.plan.plan import Network, Plan
 from benchmarks.results.row import BEFORE_FRAMES
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.networks import NetworkTraining, pretrained_network, put_into_package, take, train
@@ -125,11 +124,6 @@ def test_every_row_of_a_pretrained_network_says_so(made, tmp_path):
     theirs = {row.metric for row in rows if row.hardware == "a processor of theirs"}
     assert theirs == set(BEFORE_FRAMES)
     assert described(plan, rows)["methods"]["pbns"]["label"] == "PBNS (pretrained)"
-
-
-def test_the_networks_of_a_run_do_not_take_the_place_of_its_trainings(tmp_path):
-    with pytest.raises(StudyError, match="the folder of this run itself: give another by --out"):
-        check_machines(Study(trained=tmp_path), tmp_path / "deeper" / "..", "")
 
 
 def test_networks_of_a_run_become_those_of_the_package(made, tmp_path):

@@ -47,7 +47,6 @@ CONVERGED = {"converged": np.array([1, 1, 0, 0.0])}
         ({"status": "max_iterations", "truncated": True}, ("ok", "")),
         ({"status": "max_iterations", "reason": "frame 2: gave up"}, ("stalled", "frame 2: gave up")),
         ({"frames": 2}, ("diverged", "ended after 2 of 4 frames")),
-        ({"frames": 2, "status": "timeout", "reason": "60 s"}, ("timeout", "60 s")),
         ({"positions": np.full((4, 3, 3), np.nan)}, ("diverged", "a position is not finite")),
         ({"status": "fine"}, ("failed", "unknown status 'fine'")),
         (

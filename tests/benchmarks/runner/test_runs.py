@@ -6,9 +6,6 @@ import dataclasses
 import os
 import shutil
 import signal
-import subprocess
-import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -23,7 +20,6 @@ from benchmarks.validation.registry import KNOWN_ANSWERS
 from tests.benchmarks.runner.tasks_by_hand import InProcess, finish, plan_of, run_in_this_process
 from tests.benchmarks.runner.test_tasks import task
 
-ROOT = Path(__file__).resolve().parents[3]
 WORDS = ["smoke:speed", "--scenes", "free_fall"]
 
 
@@ -35,37 +31,6 @@ def without_report(monkeypatch):
 
 def words_of(folder: Path, methods: str) -> list[str]:
     return [*WORDS, "-o", str(folder), "--methods", methods]
-
-
-def start(program: list[str]) -> subprocess.Popen:
-    """Start Python in a session of its own."""
-    return subprocess.Popen(
-        [sys.executable, *program], cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL,
-        env=os.environ | {"PYTHONPATH": str(ROOT), "PYTHONUNBUFFERED": "1"}, start_new_session=True,
-    )  # fmt: skip
-
-
-def of_session(session: int) -> list[int]:
-    """Processes of a session that are no zombies."""
-    processes = []
-    for path in Path("/proc").glob("[0-9]*"):
-        try:
-            state, _, _, its_session = (path / "stat").read_text().rpartition(")")[2].split()[:4]
-        except OSError:
-            continue  # it has just ended
-        if int(its_session) == session and state != "Z":
-            processes.append(int(path.name))
-    return processes
-
-
-def kill(process: subprocess.Popen) -> None:
-    """Kill a process and wait until all that it has started has ended, too."""
-    process.kill()
-    process.communicate()
-    deadline = time.monotonic() + 60
-    while of_session(process.pid):
-        assert time.monotonic() < deadline
-        time.sleep(0.05)
 
 
 # --- one run at a time -------------------------------------------------------------------------------------
@@ -129,28 +94,6 @@ def test_a_failed_task_that_no_row_speaks_of_makes_the_exit_status_1(tmp_path, m
     monkeypatch.setattr(execution, "tasks_of", lambda plan: [task("lame", "raise")])
     assert execution.execute(plan_of(tmp_path)) == 1
     assert "network lame: failed: ValueError: broken on purpose" in capsys.readouterr().err
-
-
-@pytest.mark.slow
-def test_a_killed_run_loses_the_running_cell_alone(tmp_path):
-    out = tmp_path / "run"
-    options = words_of(out, "simulation,newton-1,newton-4")
-    process = start(["-m", "benchmarks.run", *options])
-    entry = out / "cache" / "cell" / "free_fall" / "simulation.json"
-    deadline = time.monotonic() + 60
-    while not entry.is_file():
-        assert time.monotonic() < deadline and process.poll() is None
-        time.sleep(0.01)
-    os.kill(process.pid, signal.SIGKILL)
-    kill(process)
-    before = entry.read_bytes()
-    assert run.main(options) == 0
-    assert entry.read_bytes() == before
-    first = RunFolder(out).read_rows()
-    assert {row.method for row in first} == {"simulation", "newton-1", "newton-4"}
-    assert run.main(options) == 0
-    assert RunFolder(out).read_rows() == first
-    assert not [path for path in out.rglob("*") if "part" in path.name]
 
 
 # --- kept files --------------------------------------------------------------------------------------------

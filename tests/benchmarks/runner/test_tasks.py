@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import os
 import signal
 import subprocess
@@ -17,13 +16,9 @@ from benchmarks.method import WorkerDied
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.executor import Executor, TaskProcess
-from benchmarks.runner.isolated_process import LOADED_BY_ALL
-from benchmarks.runner.loop import Runner, _batches
-from benchmarks.runner.schedule import tasks_of
-from benchmarks.runner.task import Context, Outcome, RunStopped, Task
-from tests.benchmarks.plan.planned import planned
+from benchmarks.runner.loop import Runner
+from benchmarks.runner.task import Context, Outcome, Task
 from tests.benchmarks.runner.cluster_by_hand import alive, until
-from tests.benchmarks.runner.misbehaving import loaded_modules
 from tests.benchmarks.runner.tasks_by_hand import InProcess
 
 
@@ -33,8 +28,6 @@ def fail(how: str) -> None:
         raise ValueError("broken on\npurpose")
     if how == "die":
         os.kill(os.getpid(), signal.SIGKILL)
-    if how == "exit":
-        os._exit(7)
     if how == "hang":
         signal.pause()
     if how == "torch":
@@ -44,8 +37,6 @@ def fail(how: str) -> None:
         raise WorkerDied(str(child.pid), "timeout")
     if how == "interrupt":
         raise KeyboardInterrupt
-    if how == "stop":
-        raise RunStopped("the disk is full")
 
 
 def write(name: str, how: str, context: Context, needed) -> Outcome:
@@ -91,7 +82,6 @@ def statuses(runner: Runner) -> dict[str, str]:
 EVENTS = [
     ("raise", "failed", "ValueError: broken on purpose", ""),
     ("die", "out-of-memory", "SIGKILL: the system was out of memory", "its own"),
-    ("exit", "failed", "the process ended with status 7", ""),
     ("hang", "timeout", "no answer within 0.5 s", "its own"),
     ("interrupt", "failed", "KeyboardInterrupt", ""),
     ("cold", "out-of-memory", "MemoryError: no room to compile", ""),
@@ -211,13 +201,6 @@ def test_a_task_begins_when_its_needs_are_there_and_nothing_is_beside_a_timed_ta
     assert set(statuses(runner).values()) == {"ok"}
 
 
-def test_the_longest_training_begins_first(tmp_path):
-    plan = planned("full:garments", "--methods", "pbns,snug,ncs,handles-20", "-o", str(tmp_path))
-    trainings = [task for task in tasks_of(plan) if task.kind == "network"]
-    names = [batch[0].label.split()[0] for batch in _batches(trainings)]
-    assert names == ["ncs", "snug", "pbns", "handles-20"]
-
-
 # --- processes ---------------------------------------------------------------------------------------------
 
 
@@ -235,15 +218,6 @@ def test_a_batch_stays_together_and_nothing_is_kept_between_batches(tmp_path):
         "one": ["one"], "two": ["one", "two"], "bad": None, "four": ["one", "two", "four"],
         "three": ["three"],
     }  # fmt: skip
-
-
-def test_what_was_finished_is_kept_where_the_run_stops(tmp_path):
-    batches = [([task("one"), task("stops", "stop"), task("after")], {})]
-    executor, kept = Executor(RunFolder(tmp_path), None, 1), []
-    with pytest.raises(RunStopped, match="the disk is full"):
-        for done, _ in executor.together(lambda: batches.pop() if batches else None):
-            kept.append(done.name)
-    assert kept == ["one"]
 
 
 def test_a_named_process_is_kept_until_it_is_released(tmp_path):
@@ -265,18 +239,3 @@ def test_what_a_task_has_started_ends_when_its_time_is_up(tmp_path):
     until(lambda: not alive(int(outcome.reason)), 5.0)
     assert process.do(task("two"), {}).result["memo"] == ["two"]
     process.close()
-
-
-def test_a_process_that_cannot_start_is_a_failure_each_time(tmp_path):
-    process = TaskProcess(RunFolder(tmp_path), lambda: None)  # cannot be sent to it
-    outcomes = [process.do(task("one"), {}) for _ in range(2)]
-    assert all(outcome.failed and "lambda" in outcome.reason for outcome in outcomes)
-
-
-@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere each process loads its own")
-def test_a_process_begins_with_what_all_need_and_nothing_that_a_scene_may_do_without(tmp_path):
-    process = TaskProcess(RunFolder(tmp_path), None)
-    there = process.do(dataclasses.replace(task("one"), run=loaded_modules), {}).result["names"]
-    process.close()
-    assert there.issuperset({"h5py", "numba", "scipy", *LOADED_BY_ALL})
-    assert not [name for name in there if name.startswith(("snug", "torch", "igl"))]
