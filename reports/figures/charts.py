@@ -123,8 +123,7 @@ def draw_points(
         band: error below which differences are inconclusive.
     """
     points = [point for curve in curves for point in (*curve.points, *curve.aside)]
-    # An error that cannot be told from the reference needs no decades of its own.
-    least = max(max((p.error for p in points), default=1.0) * 10.0**-DECADES, band / 10.0)
+    least = _least(points, band)
     best = front(p for p in points if p.error > least)
     if len(best) > 1:
         axes.plot([p.time for p in best], [p.error for p in best], color=FRONT, linewidth=5.0, zorder=1)
@@ -148,6 +147,11 @@ def draw_points(
     return {point.method for point in points if point.error <= least}
 
 
+def _least(points: Sequence[Point], band: float) -> float:
+    """Return the error below which none is drawn: what is within the reference's needs no decades."""
+    return max(max(point.error for point in points) * 10.0**-DECADES, band / 10.0)
+
+
 def _draw_marker(axes: Axes, point: Point, marker: str, colour: str, *, pale: bool) -> None:
     """Draw a point with its spreads."""
     axes.errorbar(
@@ -165,13 +169,14 @@ def _draw_marker(axes: Axes, point: Point, marker: str, colour: str, *, pale: bo
 
 
 def error_of_page_one(run: Run) -> Iterator[Drawing]:
-    """Draw an error of the leading scene in one wide panel: the first that two methods or more have."""
+    """Draw an error of the leading scene in one wide panel: the first that tells two methods apart."""
     frame, scenes = compared_cells(run)
     for scene in scenes:
         rows = frame[frame["scene"] == scene]
         for name in ERRORS:
             points = error_points(run, rows, name)
-            if len(points) > 1:
+            band = indistinct(run, rows, name)
+            if len(points) > 1 and sum(point.error > _least(points, band) for point in points) > 1:
                 yield _draw_page_one(run, rows, run.metrics[name], points)
                 return
 
