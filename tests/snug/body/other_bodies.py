@@ -1,11 +1,6 @@
 """Bodies that are not the package's, made by code from it: other mesh, layout, pose and shape."""
 
 import dataclasses
-import functools
-import tempfile
-from collections.abc import Callable, Mapping
-from pathlib import Path
-from typing import Any
 
 import igl
 import numpy as np
@@ -15,20 +10,15 @@ from benchmarks.scenes import of_garment
 from reference_sim import Trajectory, simulate
 from snug.body.parametric_body import Body
 from snug.body.skeleton import PARENTS
-from snug.body.smpl_files import read_body
 from snug.garments.garment import Garment
 
 SMPL_FACES = 13776  # 6890 vertices
 
 
-def reshaped(body: Body, scale: Any = 1.0, **betas: float) -> Body:
-    """The body with shape coefficients, beta_0=2.5, as its mean; then stretched by `scale`, one or (3,)."""
-    shape = np.zeros(body.shape_count)
-    for name, value in betas.items():
-        shape[int(name.removeprefix("beta_"))] = value
-    return dataclasses.replace(
-        body, template=body.shaped(shape) * scale, joint_template=body.joints(shape) * scale
-    )
+def child(body: Body) -> Body:
+    """The body shrunk to 70 % of its size, a little shorter still."""
+    size = np.array([0.7, 0.63, 0.7])
+    return dataclasses.replace(body, template=body.template * size, joint_template=body.joint_template * size)
 
 
 def other_mesh(body: Body, faces: int = SMPL_FACES) -> Body:
@@ -106,28 +96,6 @@ def plain_arrays(body: Body) -> dict[str, np.ndarray]:
         "joints": body.joint_template,
         "parents": body.parents,
     }
-
-
-def read_again(arrays: dict[str, np.ndarray]) -> Body:
-    """Return the body that these arrays give when written to a file and read back."""
-    with tempfile.TemporaryDirectory() as folder:
-        np.savez(Path(folder) / "body.npz", **arrays)
-        return read_body(Path(folder) / "body.npz")
-
-
-@functools.cache
-def _another() -> Body:
-    return other_mesh(Body.load())
-
-
-BODIES: Mapping[str, Callable[[], Body]] = {
-    "package": Body.load,
-    "other_mesh": lambda: read_again(with_hands(smpl_arrays(_another()), face=True)),
-    "heavy": lambda: reshaped(Body.load(), beta_1=2.5),
-    "slim": lambda: reshaped(Body.load(), beta_1=-2.5),
-    "third_shape": lambda: reshaped(Body.load(), beta_2=2.5),
-    "child": lambda: reshaped(Body.load(), (0.7, 0.63, 0.7)),
-}
 
 
 def simulate_walk(garment: Garment, body: Body, frames: int = 30) -> Trajectory:

@@ -123,22 +123,16 @@ ELBOW = np.where(np.arange(24) == 18, 1e6, 1.0)[:, None]
 @pytest.mark.parametrize(
     ("change", "says"),
     [
-        (lambda a: {k: v for k, v in a.items() if k != "weights"}, "no array weights or blend_weights"),
         (changed("weights", lambda w: 2 * w), "sum to one"),
-        (changed("v_template", lambda v: np.where(v == v[7, 1], np.nan, v)), "v_template has"),
         (changed("v_template", lambda v: v * 1000), "in metres"),
         (changed("v_template", lambda v: v * [-1, 1, -1]), "face +z"),
         (changed("v_template", lambda v: v + np.array([0.5, 0, 0])), "beside x = 0"),
-        (changed("shapedirs", lambda s: s[:3]), "shapedirs"),
-        (lambda a: {k: v for k, v in a.items() if k != "J_regressor"}, "no joints"),
         (changed("J_regressor", lambda r: r * ELBOW), "left_elbow"),
         (changed("kintree_table", lambda t: np.full((2, 24), 30)), "hangs on 30"),
         (lambda a: a | {"f": a["f"][a["v_template"][a["f"], 1].min(axis=1) > 0.12]}, "a hole at vertex"),
         (changed("f", lambda f: f[:, ::-1]), "inside out"),
-        (changed("f", lambda f: f + 1), "vertex 1000"),
-        (lambda a: a | {"posedirs": np.zeros((1000, 3, 93))}, "posedirs"),
     ],
-    ids=range(14),
+    ids=range(8),
 )
 def test_a_broken_body_is_refused_in_one_line(layouts, tmp_path, change, says):
     path = saved(tmp_path / "broken.npz", change(layouts["SMPL"]))
@@ -154,12 +148,3 @@ def test_arms_that_hang_down_are_refused(small, tmp_path):
     path = saved(tmp_path / "low.npz", plain_arrays(small) | {"joints": joints})
     with pytest.raises(BodyError, match="left arm is 45 degrees off the T pose"):
         read_body(path)
-
-
-@pytest.mark.parametrize("name", ["body.npz", "body.pkl", "none.npz"])
-def test_a_file_that_is_no_body_is_refused_in_one_line(tmp_path, name):
-    for broken in ("body.npz", "body.pkl"):
-        (tmp_path / broken).write_bytes(b"N.")
-    with pytest.raises(BodyError) as caught:
-        read_body(tmp_path / name)
-    assert name in str(caught.value) and "\n" not in str(caught.value)

@@ -3,9 +3,8 @@
 import dataclasses
 
 import numpy as np
-import pytest
 
-from snug.garments.cuts import BEND_SPAN, SEAM_CUT, CutPlane, neck_cut, outlines
+from snug.garments.cuts import SEAM_CUT, CutPlane, neck_cut, outlines
 from snug.garments.templates import find_template
 
 
@@ -19,18 +18,6 @@ def test_a_neck_is_cut_above_high_shoulders(body):
     assert neck_cut(body, 0.015).point[1] == body.joint_template[body.joint_names.index("neck"), 1]
     shirt = find_template("tshirt").tailor(low, vertices=500)
     assert np.abs(shirt.rest_positions[shirt.loops["neck"], 0]).max() < neck.reach - 0.005
-
-
-def test_the_bend_of_a_cut_ends(body):
-    cut = CutPlane("neck", (0.0, 1.0, 0.0), (0.0, 0.0, 0.0), bend=3.0)
-    z = np.linspace(-0.5, 0.5, 2001)
-    points = np.stack([0 * z, 0 * z, z], axis=1)
-    height = cut.height(points)
-    near, far = np.abs(z) <= BEND_SPAN, np.abs(z) >= 2 * BEND_SPAN
-    assert np.array_equal(height[near], 3.0 * z[near] ** 2)
-    assert height[far] == pytest.approx(6.0 * BEND_SPAN**2)
-    slope = cut.normals(points)
-    assert slope[:, 2] / slope[:, 1] == pytest.approx(np.gradient(height, z), abs=4e-3)
 
 
 def test_a_corner_that_clipping_left_twice_counts_once():

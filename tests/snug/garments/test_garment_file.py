@@ -115,24 +115,9 @@ def test_its_material_is_that_of_simulator_and_training(tmp_path, body, tube):
     preset = replace(find_preset("smoke"), frames=8, clip_frames=4)
     assets = open_assets(preset, embedded_motions(["walk"]), ["mine"], inputs=read_inputs(garment=file))
     silk = Material(young_modulus=5e4, bending_stiffness=1e-6)
-    scene = file_scene(file).at(preset).build(assets)
+    scene = GarmentScenes("mine", "mine").scene("walk").at(preset).build(assets)
     assert scene.cloth.material == DressedBody(body, assets.garments["mine"]).cloth.material == silk
     assert {type(term).__name__: term.cloth.material for term in scene.energies}["StretchStVK"] == silk
-
-
-def file_scene(file):
-    return GarmentScenes(file.name, "mine").scene("walk")
-
-
-def closed(garment):
-    """The faces with a lid on every opening."""
-    lids = [np.array([[loop[0], loop[k + 1], loop[k]] for k in range(1, len(loop) - 1)])
-            for loop in garment.loops.values()]  # fmt: skip
-    return np.concatenate([garment.faces, *lids])
-
-
-def one_turned(faces):
-    return np.where(np.arange(len(faces))[:, None] == 9, faces[:, ::-1], faces)
 
 
 def moved(garment, change):
@@ -147,8 +132,6 @@ def moved(garment, change):
         (lambda s: moved(s, lambda x: np.add(x, (0.03, -0.1, 0.02))), "mm deep in the body.*: move it onto"),
         (lambda s: moved(s, lambda x: np.add(x, (0, 0, 0.5))), "mm from the body.*: move it onto"),
         (lambda s: {"faces": np.concatenate([s.faces, s.faces[5:6]])}, "a cloth is manifold"),
-        (lambda s: {"faces": one_turned(s.faces)}, "same way"),
-        (lambda s: {"faces": closed(s)}, "no opening, the surface is closed"),
     ],
 )
 def test_what_cannot_be_worn_is_refused_with_its_remedy(tmp_path, body, shirt, spoil, words):
@@ -158,9 +141,8 @@ def test_what_cannot_be_worn_is_refused_with_its_remedy(tmp_path, body, shirt, s
     assert "mine." in str(refused.value) and "\n" not in str(refused.value)
 
 
-@pytest.mark.parametrize("thickness", [0.47, 0.47e-6])
-def test_a_material_in_other_units_is_refused(tmp_path, body, tube, thickness):
-    (tmp_path / "cotton.toml").write_text(f"thickness = {thickness}\n")
+def test_a_material_in_other_units_is_refused(tmp_path, body, tube):
+    (tmp_path / "cotton.toml").write_text("thickness = 0.47\n")
     with pytest.raises(GarmentError, match=r"its material is .* mm thick: give thickness in m"):
         read_garment(GarmentFile(path=saved(tmp_path, tube), material=tmp_path / "cotton.toml"), body)
 
@@ -181,11 +163,8 @@ def test_a_seam_that_a_program_left_open_is_refused(tmp_path, body, tube, gap=1e
 @pytest.mark.parametrize(
     ("words", "expected"),
     [
-        ("shift=-1 2", "give three numbers"),
-        ("material", "material=True: give a path"),
         ("uv_scale=2", "add rest=uv"),
         ("units=km", "units=km: choose from m, cm, mm, in"),
-        ("unit=cm", "no word is called 'unit'; there are path, units"),
     ],
 )
 def test_a_word_that_means_nothing_is_refused(words, expected):

@@ -8,7 +8,7 @@ import scipy.sparse as sp
 from snug.garments.garment import GarmentError
 from snug.garments.templates import GARMENT_TEMPLATES, find_template
 from tests.reference_sim.meshes import edge_counts, girth
-from tests.snug.body.other_bodies import BODIES, other_mesh, simulate_walk
+from tests.snug.body.other_bodies import child, other_mesh, simulate_walk
 
 KINDS = [pattern.name for pattern in GARMENT_TEMPLATES]
 
@@ -130,17 +130,6 @@ def test_ease_is_girth_at_waist_and_cuff(body):
     assert at_waist[0] > girth(body.template, body.faces, 1, at(body, "spine1")[1]) + 2 * np.pi * 0.015 + 0.06
 
 
-def test_the_shirt_hangs_from_the_chest(body, shirt):
-    """Not pressed into the waist, nor between the legs: below the chest girth does not shrink."""
-    points, faces = shirt.rest_positions, shirt.faces
-    levels = np.linspace(points[shirt.hem, 1].mean() + 0.01, at(body, "spine1")[1] + 0.15, 8)[::-1]
-    girths = [girth(points, faces, 1, level) for level in levels]
-    assert np.diff(girths).min() > -0.01
-    front = points[shirt.hem][:, 2] > 0
-    middle = np.abs(points[shirt.hem][:, 0]) < 0.05
-    assert points[shirt.hem][front & middle, 2].min() > points[shirt.hem][:, 2].max() - 0.01
-
-
 def test_another_shape_carries_the_shirt_along(body, shirt):
     assert np.array_equal(shirt.rest_for(body, None), shirt.rest_positions)
     assert np.array_equal(shirt.rest_for(body, np.zeros(10)), shirt.rest_positions)
@@ -156,11 +145,9 @@ def test_another_shape_carries_the_shirt_along(body, shirt):
 @pytest.mark.parametrize(
     ("wrong", "says"),
     [
-        ({"vertices": 99}, "vertices=99"),
         ({"ease": float("nan")}, "ease=nan"),
         ({"strap": 0.05}, "strap: no measure of a tshirt: use vertices, ease, clearance, sleeve, length"),
         ({"name": "gown"}, "'gown'.*tshirt, tunic, skirt.*dress"),
-        ({"name": "skirt", "rise": 0.5}, r"rise=0\.5: a skirt"),
     ],
 )
 def test_a_measure_out_of_range_or_of_another_kind_is_named(body, wrong, says):
@@ -218,11 +205,9 @@ def test_every_kind_of_cut_fits_another_mesh(body, kind):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("vertices", [500, 1000])
-@pytest.mark.parametrize("wearer", BODIES)
 @pytest.mark.parametrize("kind", KINDS)
-def test_every_kind_on_every_body_is_simulated(kind, wearer, vertices, tmp_path):
-    simulated = simulate_walk(
-        find_template(kind).tailor(BODIES[wearer](), vertices=vertices), BODIES[wearer]()
-    )
+@pytest.mark.parametrize("other", [other_mesh, child])
+def test_every_kind_on_another_body_is_simulated(body, kind, other):
+    wearer = other(body)
+    simulated = simulate_walk(find_template(kind).tailor(wearer, vertices=500), wearer)
     assert simulated.status == "converged" and simulated.frames == 30

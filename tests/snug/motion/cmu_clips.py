@@ -7,9 +7,9 @@ import numpy as np
 UNIT = 0.45
 
 
-def cmu_like(splay: float = 20.0) -> str:
+def cmu_like() -> str:
     """A skeleton with CMU's bone names: legs splayed, arms along x, hinge axes tilted as CMU's are."""
-    s, c = np.sin(np.radians(splay)), np.cos(np.radians(splay))
+    s, c = np.sin(np.radians(20.0)), np.cos(np.radians(20.0))
     down, up = {"l": (s, -c, 0), "r": (-s, -c, 0)}, (0, 1, 0)
     bones = [
         ("lowerback", up, 2, (0, 0, 0), "rx ry rz", "root"),
@@ -20,7 +20,7 @@ def cmu_like(splay: float = 20.0) -> str:
         ("head", up, 2, (0, 0, 0), "rx", "upperneck"),
     ]
     for side, sign in (("l", 1), ("r", -1)):
-        leg, arm = (0, 0, sign * splay), (180, -sign * 30, -sign * 90)
+        leg, arm = (0, 0, sign * 20.0), (180, -sign * 30, -sign * 90)
         bones += [
             (f"{side}hipjoint", (sign * 0.6, -0.7, 0.3), 2.4, (0, 0, 0), "", "root"),
             (f"{side}femur", down[side], 7.0, leg, "rx ry rz", f"{side}hipjoint"),
@@ -52,8 +52,8 @@ def amc_frame(number: int, **bones: tuple[float, ...]) -> str:
     return f"{number}\n" + "".join(f"{name} {' '.join(map(str, v))}\n" for name, v in values.items())
 
 
-def write_clip(folder: Path, frames: list[str], *, name: str = "07_01", skeleton: str | None = None) -> Path:
-    (folder / f"{name.split('_')[0]}.asf").write_text(skeleton or cmu_like())
-    clip = folder / f"{name}.amc"
+def write_clip(folder: Path, frames: list[str]) -> Path:
+    (folder / "07.asf").write_text(cmu_like())
+    clip = folder / "07_01.amc"
     clip.write_text(":FULLY-SPECIFIED\n:DEGREES\n" + "".join(frames))
     return clip

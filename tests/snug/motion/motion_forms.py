@@ -74,8 +74,6 @@ def write_forms(folder: Path, motion, turn=Y_UP) -> list[Path]:
         np.savez(files[-1], **arrays)
     files.append(folder / "pickled.pkl")
     files[-1].write_bytes(pickle.dumps(forms["smpl"]))
-    files.append(folder / "lists.pkl")
-    files[-1].write_bytes(pickle.dumps(forms["smpl"] | {"poses": forms["smpl"]["poses"].tolist()}))
     files.append(folder / "ours.bvh")
     files[-1].write_text(bvh(poses, trans, fps))
     files.append(folder / "mixamo.bvh")

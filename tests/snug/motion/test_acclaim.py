@@ -16,34 +16,13 @@ from snug.motion.retarget import LIMBS
 from tests.snug.motion.cmu_clips import amc_frame, write_clip
 from tests.snug.motion.motion_forms import read, refuse
 
-
-def test_lengths_axes_and_channels_are_those_of_the_file(tmp_path):
-    write_clip(tmp_path, [])
-    bones, metres = read_asf(tmp_path / "07.asf")
-    thigh, hip = bones["lfemur"], bones["lhipjoint"]
-    assert metres == pytest.approx(0.0254 / 0.45) and thigh.length == pytest.approx(7.0 * metres)
-    np.testing.assert_allclose(hip.direction, np.array([0.6, -0.7, 0.3]) / np.sqrt(0.94))
-    assert (thigh.channels, hip.channels, thigh.parent) == (("rx", "ry", "rz"), (), "lhipjoint")
-    turned = Rotation.from_euler("z", 20, degrees=True).as_matrix()
-    np.testing.assert_allclose(thigh.axes, turned, atol=1e-12)
-
-
 REFUSED = [
-    (".amc", lambda text: "", "0 frames"),
-    (".amc", lambda text: text.replace(":DEGREES", ":RADIANS"), "line 2: only angles in degrees"),
     (".amc", lambda text: text.replace("head 0.0", "head nan", 1), "line 6: 'nan' should be 1 finite"),
-    (".amc", lambda text: text.replace("head 0.0", "head 0.0 1.0", 1), "line 6: '0.0 1.0' should be 1"),
     (".amc", lambda text: text.replace("head", "tail", 1), "line 6: 'tail' is no bone"),
     (".amc", lambda text: text[: len(text) * 3 // 4].rsplit("\n", 1)[0], "frame 2 is cut off"),
-    (".asf", lambda text: " ", "no 'order'"),
     (".asf", lambda text: text.replace("angle deg", "angle rad"), "only angles in degrees"),
-    (".asf", lambda text: text.replace("name lfemur", "name left_thigh"), "'lfemur' has no entry"),
     (".asf", lambda text: text.replace("femur", "thigh"), "no bone 'lfemur'"),
-    (".asf", lambda text: text.replace("direction 0 1 0", "direction 0 0 0", 1), "direction cannot be zero"),
-    (".asf", lambda text: text.replace("dof rx ry rz", "dof rx ry rz l", 1), "channel 'l'"),
     (".asf", lambda text: text.replace("0.0 XYZ", "0.0 XZY", 1), "order XYZ"),
-    (".asf", lambda text: text.replace("position 0 0 0", "position 0 1 0"), "only roots at the origin"),
-    (".asf", lambda text: text.replace("length 0.45", "length 0", 1), "positive"),
     (".asf", lambda text: text.replace("length 7", "length -7"), "left leg of 07.asf has no length"),
 ]
 

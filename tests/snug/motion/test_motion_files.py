@@ -44,7 +44,7 @@ def test_one_motion_in_every_form_is_read_to_the_same_poses(tmp_path, turn):
     assert np.array_equal(loaded.poses, spread.poses) and loaded.name == file.stem
 
 
-@pytest.mark.parametrize(("joints", "hand"), [(24, 0.05), (52, 0.0), (55, 0.0)])
+@pytest.mark.parametrize(("joints", "hand"), [(24, 0.05), (52, 0.0)])
 def test_hands_are_damped_and_fingers_are_no_hands(tmp_path, joints, hand):
     poses = np.zeros((3, joints, 3))
     poses[:, 20:, 2] = 0.5
@@ -60,7 +60,6 @@ def spike(frame, joint="right_elbow", by=2.5):
     return poses
 
 
-LONG = np.zeros((20_000, 66))
 FROM_5 = np.arange(40)[:, None] >= 5
 FAR = KICK.translations + np.where(FROM_5, [0.5, 0.0, 0.0], 0.0)
 
@@ -70,9 +69,6 @@ FAR = KICK.translations + np.where(FROM_5, [0.5, 0.0, 0.0], 0.0)
     [
         ({"poses": KICK.poses[:, :23, None]}, r"'poses' has shape \(40, 23, 1, 3\)"),
         ({"poses": KICK.poses[:, :21]}, "no array 'root_orient'"),
-        ({"poses": KICK.poses[:, :20]}, "72 .SMPL."),
-        ({"poses": np.zeros((0, 72)), "trans": np.zeros((0, 3))}, "empty"),
-        ({"poses": LONG, "trans": LONG[:, :3], "fps": 10}, "last 2000 s"),
         ({"poses": np.degrees(KICK.poses)}, "radians, not degrees"),
         ({"trans": KICK.translations + 1e5}, "metres"),
         ({"trans": KICK.translations[1:]}, r"'trans' has shape \(39, 3\); give \(40, 3\)"),
@@ -80,7 +76,6 @@ FAR = KICK.translations + np.where(FROM_5, [0.5, 0.0, 0.0], 0.0)
         ({"poses": spike(20)}, "first of right_elbow before frame 20; cut"),
         ({"trans": FAR}, "first of the root before frame 5; cut"),
         ({"fps": 0}, "rates are 5 to 1000"),
-        ({"fps": np.array([30.0, 30.0])}, "are 2 numbers"),
     ],
 )
 def test_arrays_that_are_no_motion_are_refused(tmp_path, changes, words):
@@ -88,14 +83,11 @@ def test_arrays_that_are_no_motion_are_refused(tmp_path, changes, words):
 
 
 def test_paths_without_a_motion_are_refused(tmp_path):
-    notes, empty, other = tmp_path / "notes.txt", tmp_path / "empty", tmp_path / "other.npz"
+    notes, empty = tmp_path / "notes.txt", tmp_path / "empty"
     notes.write_text("hello")
     empty.mkdir()
-    np.savez(other, x=np.zeros(3))
-    refuse(tmp_path / "none.amc", "no such file")
     refuse(notes, "unknown kind")
     refuse(empty, "holds no")
-    refuse(other, "no array .poses. .found none")
 
 
 def test_a_rate_is_said_once(tmp_path):
@@ -112,7 +104,6 @@ def test_a_rate_is_said_once(tmp_path):
     [
         (Y_UP, "z", "stands along z in 0 % .*,up=y"),
         (TO_Z_UP, "y", "stands along y in 0 %"),
-        (np.diag([1.0, -1.0, -1.0]), "", "in 0 % of the frames only"),
     ],
 )
 def test_a_body_on_its_back_or_head_is_refused(tmp_path, turn, up, words):

@@ -1,8 +1,6 @@
 """Recorded clips of the library: composition, roles, frozen content, and that no recording error is left."""
 
 import hashlib
-import tomllib
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,8 +23,6 @@ from snug.motion.motion import arm_clearance
 from snug.motion.recording import MAX_TURN_SPEED, check_recording
 from tests.snug.motion.motion_forms import joint_speeds
 
-ROOT = Path(__file__).resolve().parents[3]
-NOTICE = "snug/motion/recorded/NOTICE.md"
 TURN_LIMIT = 30.0  # [rad/s] the notice's: half of what is let pass in a user's file
 # What a public re-implementation of the paper's recipe trains on, and validates with.
 THEIR_TRAINING = {"02_04", "02_05", "05_12", "05_13", "05_14", "05_20"}
@@ -94,9 +90,3 @@ def test_a_segment_starts_at_the_origin_facing_forward_on_the_clips_floor(name, 
     np.testing.assert_array_equal(motion.poses[:, 1:], clip.poses[start:stop, 1:])
     steps = [np.linalg.norm(np.diff(m.translations, axis=0), axis=1) for m in (motion, clip.cut(start, stop))]
     np.testing.assert_allclose(*steps, atol=1e-12)
-
-
-def test_the_notice_of_the_recordings_is_shipped():
-    notice, project = ROOT / NOTICE, tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
-    assert "EIA-0196217" in notice.read_text(encoding="utf-8")
-    assert NOTICE in project["project"]["license-files"]
