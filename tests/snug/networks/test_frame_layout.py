@@ -4,11 +4,9 @@ import numpy as np
 import pytest
 import torch
 
-from snug.body.skinning import skin
-from snug.kernels import one_frame as frame_kernels
 from snug.kinds import KINDS
 from snug.networks.garment_network import make_network
-from snug.networks.roll_out import CompiledFrame, prepare_frames, roll_out
+from snug.networks.roll_out import prepare_frames, roll_out
 from snug.networks.trained_model import TrainedModel
 from tests.snug.training.dressing import swaying, tube_dress
 
@@ -53,20 +51,6 @@ def test_a_compiled_frame_is_the_modules_own_and_that_of_its_file(kind, tmp_path
     assert np.abs(positions - expected).max() < 3e-6 * max(size, 1.0)
 
 
-@pytest.mark.parametrize(("vertices", "joints"), [(1, 2), (200, 24)])
-def test_skinning_by_blocks_is_skinning(vertices, joints):
-    random = np.random.default_rng(vertices)
-    weights = random.random((vertices, joints)) * (random.random((vertices, joints)) < 0.3)
-    weights[:, 0] += 1e-3
-    weights = torch.from_numpy(weights / weights.sum(1, keepdims=True)).float()
-    rest = torch.from_numpy(random.normal(size=(vertices, 3))).float()
-    transforms = torch.from_numpy(random.normal(size=(joints, 3, 4))).float()
-    frame, out, pelvis = CompiledFrame(rest, weights), np.full((vertices, 3), np.nan), random.normal(size=3)
-    frame(np.empty(0, np.float32), transforms.numpy(), pelvis, frame.start(), out)
-    expected = skin(rest.double(), weights.double(), transforms.double()).numpy() + pelvis
-    assert np.abs(out - expected).max() < 3e-6
-
-
 def test_two_roll_outs_at_once_keep_their_own_states():
     model, motion = random_model("snug"), swaying(6)
     begin = prepare_frames(model, tube_dress(), motion)
@@ -76,11 +60,7 @@ def test_two_roll_outs_at_once_keep_their_own_states():
     assert np.abs(alone - np.array(list(prepare_frames(None, tube_dress(), motion)()))).max() > 1e-3
 
 
-def test_gates_are_torchs_gates_and_not_a_number_stays_so():
-    x = np.concatenate([np.linspace(-30, 30, 4001), [-1e30, -200.0, 200.0, 1e30]]).astype(np.float32)
-    sigmoid = np.array([frame_kernels._sigmoid(value) for value in x])
-    assert np.abs(sigmoid - 1 / (1 + np.exp(-x.astype(np.float64).clip(-700)))).max() < 1.2e-7
-    assert np.isnan(frame_kernels._sigmoid(np.float32("nan")))
+def test_not_a_number_stays_so():
     model = random_model("snug")
     with torch.no_grad():
         model.network.gru.bias_hh_l1[5] = float("nan")

@@ -127,9 +127,6 @@ def test_closed_forms_hide_no_window_that_is_no_number():
     [
         ({"pose_input": "quaternion"}, "pose_input='quaternion'"),
         ({"terms": ("strain", "wind")}, "'wind'"),
-        ({"window": 2}, "window"),
-        ({"learning_rate": 0.0}, "learning_rate"),
-        ({"weight_decay": -0.1}, "weight_decay"),
         ({"momentum": 0.9}, "'momentum' is unknown or missing"),
     ],
 )

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import torch
 
-from snug.kinds import KINDS
 from snug.named_recipes import PAPER
 from snug.networks.garment_network import make_network
 from snug.networks.roll_out import (
@@ -39,23 +38,6 @@ def test_what_came_before_a_motion_is_known_to_inputs_and_state(kind):
         prepare_frame_inputs(model, dressed, rest, earlier=before),
     )
     assert torch.allclose(known(0)[0], make(5)[0], atol=1e-6)
-
-
-@pytest.mark.parametrize("kind", ["snug", "pbns", "santesteban2019", "ncs"])
-def test_inputs_made_frame_by_frame_are_those_of_the_whole_motion(kind, narrow):
-    dressed, motion = tube_dress(), swaying()
-    model = untrained_model(kind, dressed, [motion], seed=0, recipe=KINDS[kind].recipe)
-    features = dressed.features(motion, model.recipe, feature_set=model.network.feature_set)
-    transforms, pelvis = dressed.transforms(motion.poses), dressed.pelvis(motion)
-    make = prepare_frame_inputs(model, dressed, motion)
-    for frame in reversed(range(motion.frames)):
-        made = make(frame)
-        assert made[0].shape == features[frame].shape
-        assert torch.allclose(made[0], features[frame], rtol=1e-5, atol=1e-6)
-        assert torch.allclose(made[1], transforms[frame], rtol=1e-6, atol=1e-7)
-        assert np.array_equal(made[2], pelvis[frame])
-    assert features.diff(dim=0).abs().max() > 1e-2
-    assert prepare_frame_inputs(None, dressed, motion)(3)[0] is None
 
 
 def test_a_quasi_static_frame_forgets_the_past_and_the_velocity():

@@ -2,37 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from snug import trained
-from snug.networks.garment_network import make_network
-from snug.networks.tensor_file import read_header
 from snug.networks.trained_model import TrainedModel
-from snug.recipe import DEFAULT
 
 PACKAGE = Path(trained.FOLDER).parents[1]
 LARGEST = 60e6  # bytes of the whole package
 NETWORKS = sorted(trained.trained_networks())
-
-
-@pytest.fixture
-def packaged(tmp_path, monkeypatch) -> TrainedModel:
-    """A tiny network, as the one that the package has."""
-    monkeypatch.setattr(trained, "FOLDER", tmp_path)
-    model = TrainedModel("pbns", make_network("pbns", 141, 4, DEFAULT, seed=3), DEFAULT, seed=3)
-    model = replace(model, origin={"commit": "0123456789"})
-    model.save(tmp_path / "pbns-tube.safetensors")
-    return model
-
-
-def test_a_network_is_loaded_by_its_name_with_its_origin(packaged, tmp_path, monkeypatch):
-    monkeypatch.chdir(tmp_path.parent)
-    loaded = TrainedModel.load("pbns-tube")
-    assert (loaded.seed, loaded.origin) == (3, packaged.origin)
-    assert read_header(tmp_path / "pbns-tube.safetensors")["origin"] == packaged.origin
 
 
 def test_the_package_has_the_networks_of_the_default_run_and_stays_small():

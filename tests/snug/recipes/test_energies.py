@@ -107,7 +107,6 @@ def test_an_energy_of_the_simulator_that_no_recipe_here_has_can_be_trained():
     ("name", "message"),
     [
         ("wind", "unknown energy 'wind': use one of area_barrier, bending, gravity, .*spring, .*strain"),
-        ("friction", "is made of (contact|barrier)"),
         ("barrier", "prepared for each step"),
     ],
 )

@@ -1,5 +1,4 @@
-"""The step that a GPU runs, on the CPU: torch definitions and torch contact give what the kernels give, and
-nothing is made anywhere but where it is told to."""
+"""The step that a GPU runs, on the CPU: torch definitions and torch contact give what the kernels give."""
 
 from dataclasses import replace
 from functools import partial
@@ -7,7 +6,6 @@ from functools import partial
 import numpy as np
 import pytest
 import torch
-from torch.overrides import TorchFunctionMode
 
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
 from reference_sim.kernels.fast_kernels import fast_kernel
@@ -113,36 +111,6 @@ def test_anchors_walk_to_the_closest_skin_by_torch_and_by_kernels(region):
     for anchors in (fast, slow):
         home = np.linalg.norm(patch.sample_rest - patch.centroids[anchors.faces], axis=-1)
         assert (home[anchors.faces != still.faces] < region).all()
-
-
-MAKERS = (
-    torch.zeros, torch.ones, torch.full, torch.empty, torch.eye, torch.arange, torch.tensor, torch.as_tensor,
-    torch.from_numpy, torch.rand, torch.randn, torch.randperm,
-)  # fmt: skip
-
-
-class Unplaced(TorchFunctionMode):
-    """Lists tensors that are made without a word about the device they belong on."""
-
-    def __init__(self):
-        super().__init__()
-        self.found = []
-
-    def __torch_function__(self, function, types, args=(), kwargs=None):
-        kwargs = kwargs or {}
-        if function in MAKERS and kwargs.get("device") is None and not isinstance(args[0], torch.Tensor):
-            self.found.append(function.__name__)
-        return function(*args, **kwargs)
-
-
-@pytest.mark.parametrize("recipe", [PLAIN, PAPER], ids=["default", "paper"])
-def test_a_step_makes_nothing_but_where_it_is_told_to(recipe, monkeypatch):
-    monkeypatch.setattr(contact_planes, "REFRESH", 0.1)
-    trainer = made(recipe, kernels=False)
-    trainer.dressed.rest_directions()  # kept by the dress, which tests share: made on the CPU
-    with Unplaced() as unplaced:
-        row = trainer.step(0)
-    assert unplaced.found == [] and np.isfinite(row["loss"])
 
 
 def lane_by_lane(kernel, x):

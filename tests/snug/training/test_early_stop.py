@@ -82,14 +82,6 @@ def test_supervised_validates_against_its_own_targets():
     assert model.summary["validation"]["best"] == pytest.approx(4.0, rel=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("changed", "message"),
-    [
-        ({"motions": [swaying(20)]}, "'sway' cannot both"),
-        ({"every": 0}, "every"),
-        ({"motions": [replace(HELD, fps=60.0)]}, "60 frames a second, training 30"),
-    ],
-)
-def test_unfit_validations_are_refused(changed, message):
-    with pytest.raises(TrainingError, match=message):
-        Validator(make_trainer(), Validation(**{"motions": [HELD]} | changed))
+def test_a_motion_that_trains_does_not_validate():
+    with pytest.raises(TrainingError, match="'sway' cannot both"):
+        Validator(make_trainer(), Validation(motions=[swaying(20)]))

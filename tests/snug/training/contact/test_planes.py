@@ -122,24 +122,6 @@ def test_nothing_is_propagated_to_a_frame_in_which_the_body_is_elsewhere(monkeyp
     assert propagated([motion], 20, monkeypatch) == [20, 21]
 
 
-def test_anchors_walk_while_training_and_are_in_its_state(monkeypatch):
-    monkeypatch.setattr(contact_planes, "REFRESH", 0.0)
-    trainer, other = made(), made()
-    contact, twin = trainer.contact, other.contact
-    with torch.no_grad():  # into the skin
-        trainer.network.offsets.bias.view(-1, 3)[:, 2] = -0.8
-    trainer.step(0)
-    moved = (contact.cache.faces != twin.cache.faces).any(1)
-    assert 0 < moved.sum() < len(moved)
-    tensors, facts = contact.state()
-    assert set(np.flatnonzero(moved)) <= set(tensors["changed"].tolist()) and len(tensors["changed"]) < len(
-        moved
-    )
-    twin.resume(tensors, facts)
-    assert (twin.cache.faces == contact.cache.faces).all()
-    assert (twin.cache.barycentric == contact.cache.barycentric).all()
-
-
 def test_each_part_of_an_epoch_passes_over_all_motions():
     trainer = made([swaying(402)])
     count = len(trainer.data.starts)

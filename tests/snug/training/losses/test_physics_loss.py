@@ -15,7 +15,7 @@ from snug.kernels.contact import byte_normals
 from snug.kernels.skinning import from_lanes, to_lanes
 from snug.named_recipes import PAPER, PBNS_SPRINGS, RECIPES
 from snug.recipe import DEFAULT, Recipe
-from snug.training.contact_cache import EXACT, PARTS, ContactCache, Patch, quantise
+from snug.training.contact_cache import EXACT, PARTS, ContactCache, Patch
 from snug.training.physics_loss import ClosedForm, PhysicsLoss, make_contact
 from tests.snug.training.dressing import planes_of, swaying, tube_dress
 
@@ -179,13 +179,3 @@ def test_energy_at_anchors_is_that_of_their_planes(recipe):
     x[1, 3] = np.nan
     values, _ = energies()
     assert np.isfinite(values[0]) and np.isnan(values[1])
-
-
-def test_remembered_anchors_lie_in_their_faces():
-    random = np.random.default_rng(0)
-    exact = random.dirichlet([0.3, 0.3, 0.3], 5000)[:, 1:]
-    exact[:3] = (0.5, 0.5), (1.0, 0.0), (0.0, 1.0)
-    parts = quantise(exact)
-    assert np.array_equal(quantise(torch.as_tensor(exact)).numpy(), parts)
-    assert (parts == parts.astype(np.uint8)).all() and (parts.sum(1) <= 255).all()
-    assert np.abs(parts / PARTS - exact).max() <= 1.01 / 255

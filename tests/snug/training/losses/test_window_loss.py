@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from snug.named_recipes import PAPER
 from snug.recipe import INERTIA_FORMS, Recipe
 from snug.training.physics_loss import PhysicsLoss
-from tests.snug.training.dressing import swaying, tube_dress
+from tests.snug.training.dressing import tube_dress
 
 DT = 1 / 30
 LAMBDA, MU, DENSITY, HINGE = 20.8638, 11.0774, 0.20022, 3.96e-5  # N/m, N/m, kg/m^2, J
@@ -127,13 +127,3 @@ def test_a_detached_past_gets_no_gradient_and_the_present_the_same():
     )
     assert not detached[:, :2].any() and whole[:, :2].any()
     assert torch.allclose(detached[:, 2], whole[:, 2])
-
-
-def test_the_training_set_knows_the_motion_of_the_pelvis():
-    from snug.training.training_set import TrainingSet
-
-    motion = swaying(9)
-    data = TrainingSet(tube_dress(), [motion], PAPER, features="motion", sequences=True)
-    pelvis = tube_dress().pelvis(motion)
-    assert np.allclose(data.behind[1:], pelvis[:-1] - pelvis[1:], atol=1e-6) and not data.behind[0].any()
-    assert np.allclose(data.ahead[2:], data.behind[2:] - data.behind[1:-1], atol=1e-6)
