@@ -99,15 +99,9 @@ def test_a_rate_is_said_once(tmp_path):
     refuse(clip, "no frame rate; add ,fps=N")
 
 
-@pytest.mark.parametrize(
-    ("turn", "up", "words"),
-    [
-        (Y_UP, "z", "stands along z in 0 % .*,up=y"),
-        (TO_Z_UP, "y", "stands along y in 0 %"),
-    ],
-)
-def test_a_body_on_its_back_or_head_is_refused(tmp_path, turn, up, words):
-    refuse(write(tmp_path / "clip.npz", WALK, turn), words, up=up)
+def test_a_body_on_its_back_is_refused(tmp_path):
+    refuse(write(tmp_path / "a.npz", WALK), "stands along z in 0 % .*,up=y", up="z")
+    refuse(write(tmp_path / "a.npz", WALK, TO_Z_UP), "stands along y in 0 %", up="y")
 
 
 @pytest.mark.parametrize("turn", [Y_UP, TO_Z_UP], ids=["y up", "z up"])

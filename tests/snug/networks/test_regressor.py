@@ -50,20 +50,6 @@ def test_default_inputs_know_lean_speed_and_shape():
     assert dressed.features(motion, PAPER, feature_set="pose").shape == (motion.frames, 72)
 
 
-def test_dresser_agrees_with_the_body_in_the_world():
-    """A garment that is a piece of the body, with the body's weights, must land on the posed body."""
-    dressed, motion = tube_dress(), swaying()
-    betas = np.array([1.0, -0.5, 0.3, 0, 0, 0, 0, 0.2, 0, -0.4])
-    body = dressed.body
-    expected = body.vertices(motion.poses, motion.translations, betas)[:, ::97]
-    from snug.body.skinning import skin
-
-    weights = torch.as_tensor(body.skinning_weights[::97]).float()
-    rest = torch.as_tensor(body.shaped(betas)[::97]).float()
-    posed = skin(rest, weights, dressed.transforms(motion.poses, betas)).double().numpy()
-    assert np.abs(posed + dressed.pelvis(motion, betas)[:, None] - expected).max() < 1e-5
-
-
 def test_rest_follows_the_body_shape():
     dressed = tube_dress()
     betas = np.array([0.5, 2.0, -1.0, 0, 0, 1.0, 0, 0, 0, -2.0])

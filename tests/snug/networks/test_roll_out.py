@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import torch
 
-from snug.named_recipes import PAPER
 from snug.networks.garment_network import make_network
 from snug.networks.roll_out import (
     RollOutError,
@@ -66,18 +65,15 @@ def test_body_shape_changes_the_roll_out_and_the_network_sees_shapes_it_has_met(
         assert least <= np.abs(offsets - plain).max() < most
 
 
-def test_misfits_of_vertices_numbers_triangles_and_rate_are_named():
+def test_misfits_of_vertices_triangles_and_rate_are_named():
     dressed, motion, fast = tube_dress(), swaying(), swaying(fps=60.0)
     snug, pbns = (untrained_model(kind, dressed, [motion], seed=0) for kind in ("snug", "pbns"))
     other = TrainedModel("snug", make_network("snug", 154, 7, DEFAULT, seed=0), DEFAULT)
-    literal = replace(snug, recipe=PAPER)
     for model, moved, message in (
         (other, motion, "7 vertices, the garment 150"),
-        (literal, motion, "reads 154 numbers"),
         (replace(snug, triangles="another"), motion, "as many vertices and other triangles"),
         (snug, fast, r"learned from 30 frames a second, motion .* has 60: resample"),
     ):
         with pytest.raises(RollOutError, match=message):
             roll_out(model, dressed, moved)
     roll_out(pbns, dressed, fast)  # a pose has no rate
-    assert (roll_out(snug, dressed, motion).frame_seconds > 0.0).all()

@@ -63,13 +63,7 @@ def equal_states(plain, captured):
         assert torch.allclose(tensor.double(), theirs[name].double(), rtol=1e-4, atol=1e-6), name
 
 
-@pytest.mark.parametrize(
-    ("kind", "recipe"),
-    [
-        ("snug", PLAIN),
-        ("pbns", PAPER),
-    ],
-)
+@pytest.mark.parametrize(("kind", "recipe"), [("snug", PLAIN), ("pbns", PAPER)])
 def test_a_captured_step_is_the_step(kind, recipe, monkeypatch):
     """The replayed step gives the numbers of the step in single operations, and leaves the same behind."""
     monkeypatch.setattr(contact_planes, "REFRESH", 0.1)

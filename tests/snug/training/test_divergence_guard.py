@@ -95,17 +95,6 @@ def test_an_energy_around_zero_makes_no_runaway_of_one_high_window(usual):
     assert guard.judge(SETTLING + 9, np.full(16, 20.0), str) == "distrust"
 
 
-def test_data_that_is_not_finite_does_not_wear_down_the_rate():
-    trainer = make_trainer()
-    trainer.step(0)
-    good = weights_of(trainer)
-    trainer.data.features[:] = float("nan")
-    for number in range(1, 20):
-        trainer.step(number)
-    assert trainer.guard.rate == 0.5 and trainer.guard.summary["skipped_updates"] == 19
-    assert torch.isfinite(weights_of(trainer)).all() and (weights_of(trainer) - good).abs().max() < 0.01
-
-
 def test_a_high_window_has_its_anchors_searched_before_it_is_judged(monkeypatch):
     """Anchors from the wrong side of the body claim a contact that is none."""
     monkeypatch.setattr(contact_planes, "REFRESH", 0.0)
