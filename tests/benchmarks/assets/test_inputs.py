@@ -41,10 +41,3 @@ def test_digests_are_of_what_was_read(tmp_path):
 def test_a_motion_that_cannot_take_part_is_refused(names, frames, message, tmp_path):
     with pytest.raises(InputError, match=message):
         read_inputs(motions=[write_motions(tmp_path, *names, frames=frames)])
-
-
-def test_two_motions_of_one_name_are_refused(tmp_path):
-    folder = write_motions(tmp_path, "a", "b")
-    assert set(read_inputs(motions=[folder, "library"]).motions) == {"a", "b"}
-    with pytest.raises(InputError, match="'a' is taken"):
-        read_inputs(motions=[folder, folder])

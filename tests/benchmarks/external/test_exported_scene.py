@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import re
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +12,7 @@ from scipy.linalg import expm
 
 from benchmarks import export
 from benchmarks.external.roll_out_files import RollOutOption, expected_positions
-from benchmarks.external.scene_files import SCORED, facts_of, readme, write_motion, write_scene
+from benchmarks.external.scene_files import write_motion, write_scene
 from benchmarks.methods import find_method
 from benchmarks.methods.outside import entry_of
 from benchmarks.metric import RollOut, SceneRollOuts
@@ -27,7 +26,7 @@ from reference_sim.trajectory import write_obj
 from snug.file_options import MotionFileOptions
 from snug.motion.files import read_motion
 from snug.networks.dressed_body import DressedBody
-from tests.benchmarks.runner.tasks_by_hand import assets_of, dressed_scene, prepared, small_scene
+from tests.benchmarks.runner.tasks_by_hand import assets_of, dressed_scene, prepared
 from tests.snug.training.dressing import swaying, tube_dress
 
 
@@ -192,14 +191,6 @@ def test_scenes_without_a_body_are_exported_too(tmp_path, capsys):
     assert export.main(["flags", "--set", "sizes=smoke", "-o", str(tmp_path / "other")]) == 2
     assert [path.name for path in tmp_path.iterdir()] == ["flag"]
     assert capsys.readouterr().err.count("\n") == 2
-
-
-@pytest.mark.parametrize("step", [1.0 / 30.0, 0.006])
-def test_the_rate_that_the_readme_names_is_that_of_the_scene(step, tmp_path):
-    scene = dataclasses.replace(small_scene("hanging_sheet", cells=2, frames=3), dt=step)
-    facts = facts_of(scene) | {"preset": "smoke", "description": "a sheet"}
-    stated = re.search(r"numpy\.savez\(.* fps=(\S+)\)", readme(facts, SCORED))[1]
-    assert float(stated) == 1.0 / step and (step == 0.006 or stated == "30")
 
 
 def test_of_a_part_of_a_motion_the_frames_before_it_are_exported(tmp_path):

@@ -141,15 +141,6 @@ def test_what_does_not_belong_to_the_scene_is_refused_with_the_remedy(name, tmp_
     assert str(refused.value).count("mine.npz") == 1 and "\n" not in str(refused.value)
 
 
-def test_a_position_that_is_not_finite_is_named_by_frame_and_vertex(tmp_path):
-    exploded = X.copy()
-    exploded[5, 11:, 1] = np.inf
-    path = write("npz", tmp_path, exploded)
-    made = stored(path)[0].run()
-    assert made.status == "diverged"
-    assert made.reason == f"{path}: frame 5, vertex 11: a position is not finite"
-
-
 def test_unit_and_axis_are_mended_when_they_are_given(tmp_path):
     expected = direct(X)
     metrics = rows(write("npz", tmp_path, Z_UP), units="cm", up="z")

@@ -1,30 +1,16 @@
-"""Every trained method has a training; one that was killed goes on where it was."""
+"""A training that was killed goes on where it was."""
 
 from __future__ import annotations
 
 import pytest
 import torch
 
-from benchmarks.methods import METHODS
-from benchmarks.methods.declared_networks import TRAININGS
-from benchmarks.presets import PRESETS
 from benchmarks.results.run_folder import RunFolder, model_path
 from benchmarks.runner.networks import train
-from snug.kinds import KINDS
 from snug.networks.trained_model import TrainedModel
 from snug.training.optimisation_step import Trainer
 from tests.benchmarks.runner.tasks_by_hand import assets_of, context, training
 from tests.snug.training.dressing import swaying, tube_dress
-
-
-def test_every_kind_is_a_method_and_every_trained_method_has_steps_in_each_preset():
-    trained = [entry for entry in METHODS if entry.trained not in (None, "untrained")]
-    kinds = [(entry.training or TRAININGS[entry.trained]).kind for entry in trained]
-    assert set(kinds) == set(KINDS)
-    for entry, kind in zip(trained, kinds):
-        assert entry.seeded != KINDS[kind].fitted and entry.reporting.pairing_group
-        assert all(preset.steps_of(entry.trained, kind) > 0 for preset in PRESETS)
-
 
 CHECKPOINT = ".snug-seed0.checkpoint.safetensors"
 

@@ -13,7 +13,6 @@ from benchmarks.scenes.sheets import exact_fall
 from reference_sim import Cloth, Material, Obstacle, Potential, simulate
 from reference_sim.energies import (
     BendHinge,
-    ContactBarrier,
     ContactPenalty,
     Gravity,
     Inertia,
@@ -146,15 +145,8 @@ def test_weight_alone_is_one_sweep_to_the_exact_fall(method):
 
 
 @pytest.mark.parametrize("method", [VertexBlockDescent, XPBD])
-def test_what_a_sweep_cannot_do_is_refused_and_a_runaway_is_a_status(method, touching, monkeypatch):
+def test_a_runaway_is_a_status(method, touching, monkeypatch):
     potential, guess = touching
-    cloth = potential.cloth
-    for terms, message in (
-        ([ContactBarrier(cloth), Inertia(cloth, DT)], "no kernel for the term"),
-        ([Gravity(cloth)], "needs inertia"),
-    ):
-        with pytest.raises(ValueError, match=message):
-            method(Potential(terms), max_iterations=1)
     nowhere = guess.copy()
     nowhere[10] = np.nan
     monkeypatch.setattr(potential.energies[-1], "x_hat", nowhere)  # inertia: XPBD starts from the prediction

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 from benchmarks.meshes import icosphere, right_grid
-from benchmarks.metrics import find_metric
 from benchmarks.metrics.curvature import CurvatureSeries, histogram_distance
 from benchmarks.metrics.energy import energy_series
 from benchmarks.metrics.penetration_and_distances import distance_rms, own_part_depth, penetration
@@ -167,10 +166,3 @@ def test_the_worst_frame_is_found_beyond_what_is_so_at_rest_and_in_the_reference
     assert metrics["body/self_intersection_frame"] == 2.0
     roll_out.entry.role = "learned"
     assert measure_body(roll_out) == {}
-
-
-def test_a_pattern_serves_a_new_term():
-    term = find_metric("energy/my_term")
-    assert (term.name, term.unit, term.title, term.table) == ("energy/my_term", "J", "My term", "energies")
-    with pytest.raises(KeyError):
-        find_metric("nonsense/x")

@@ -10,7 +10,6 @@ from benchmarks import provenance
 from benchmarks.methods import find_method
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
-from benchmarks.plan.plan import Network
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule, tasks_of
 from tests.benchmarks.runner.tasks_by_hand import dressed_scene, plan_of
@@ -33,16 +32,6 @@ def changed(plan, other) -> set[str]:
     before, after = inputs_of(plan), inputs_of(other)
     assert before.keys() == after.keys()
     return {id[0] for id in before if before[id] != after[id]}
-
-
-def test_the_key_of_a_training_is_that_of_all_it_depends_on(plan, monkeypatch):
-    def key() -> str:
-        return Schedule(plan).training(Network("snug", 0, "tshirt")).key
-
-    before = key()
-    assert before and key() == before
-    monkeypatch.setattr("benchmarks.provenance.versions", lambda: {"numpy": "another"})
-    assert key() != before
 
 
 def test_only_what_trains_depends_on_the_accelerator_and_nothing_on_the_cores(plan, monkeypatch):

@@ -10,7 +10,6 @@ from benchmarks.plan.plan import Plan
 from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
-from benchmarks.runner.execute_plan import describe
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.rows import clock_costs, rows_of
 from benchmarks.runner.schedule import tasks_of
@@ -119,23 +118,6 @@ def test_a_cell_that_is_run_again_leaves_nothing_of_its_earlier_run(tmp_path):
     assert measured_after(0) == []  # the others are compared with it
     outcome_of(plan_of(tmp_path, "simulation", "newton-1", how="raise"), 1)
     assert not folder.trajectory_path("free_fall", "newton-1").exists()
-
-
-def test_a_dry_run_tells_what_is_there(tmp_path):
-    plan = plan_of(tmp_path / "run", "simulation", "newton-1", "skinning")
-    assert "4 tasks to run; 0 cached" in describe(plan) and not plan.folder.exists()
-    outcome_of(plan)
-    description = describe(plan)
-    for line in (
-        "cell free_fall x simulation: cached\n", "metrics free_fall x simulation: run (missing)",
-        "cell free_fall x newton-1: run (missing)", "cell free_fall x skinning: skip (",
-        "3 tasks to run; 1 cached",
-    ):  # fmt: skip
-        assert line in description
-    longer = dataclasses.replace(TINY, sheet_frames=5)
-    stale = describe(plan_of(plan.folder, "simulation", "newton-1", preset=longer))
-    assert "cell free_fall x simulation: run (stale: scene)" in stale
-    assert "4 tasks to run" in describe(dataclasses.replace(plan, fresh=True))
 
 
 # --- repeats -----------------------------------------------------------------------------------------------

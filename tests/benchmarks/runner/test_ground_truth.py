@@ -121,11 +121,6 @@ def test_a_network_learns_from_given_motions_and_from_the_clips_that_are_there(t
     assert result["clips_left_out"] == 1 and result["left_out"] == []
     lost = train(task, context(tmp_path, assets), {("data", MOTION.name): done}).result
     assert lost["frames"] == 90
-    called = dataclasses.replace(MOTION, name="mixed_0")
-    task = dataclasses.replace(training("supervised", "mixed_0", steps=1), clips=tuple(clips))
-    needed = {("data", "mixed_0"): done, **clips}
-    with pytest.raises(ValueError, match=r"mixed_0.*rename"):
-        train(task, context(tmp_path, assets_of(tube_dress(), called)), needed)
 
 
 def test_the_same_simulations_serve_every_seed_and_training(tmp_path, monkeypatch):

@@ -8,26 +8,11 @@ import subprocess
 import sys
 from pathlib import Path
 
-import pytest
-
 from benchmarks.assets import embedded_motions, open_assets
 from benchmarks.presets import find_preset
 from benchmarks.scenes import of_garment
 
 ROOT = Path(__file__).resolve().parents[3]
-CELL = """
-import sys
-from pathlib import Path
-from benchmarks.methods import find_method
-from benchmarks.presets import find_preset
-from benchmarks.scenes import find_scene
-scene = find_scene(sys.argv[1]).at(find_preset("smoke")).build()
-for name in sys.argv[2].split(","):
-    method = find_method(name).make(models=Path("."), seed=0)
-    method.prepare(scene)
-    assert method.run().frames == scene.frames
-print(*sys.modules)
-"""
 DRESSED = """
 import dataclasses, pickle, sys
 from pathlib import Path
@@ -56,20 +41,6 @@ def loaded(code: str, *arguments: str) -> set[str]:
     )  # fmt: skip
     assert answer.returncode == 0, answer.stderr[-2000:]
     return set(answer.stdout.split())
-
-
-@pytest.mark.parametrize(
-    ("scene", "present", "absent"),
-    [
-        ("hanging_sheet", MATERIAL, (*BODY, OBSTACLE, *CONTACT)),
-        ("sheet_on_sphere", (*MATERIAL, CONTACT[0], OBSTACLE), (*NETWORKS, BODY[4], CONTACT[1])),
-        ("free_fall", ("reference_sim.energies.gravity",), (*MATERIAL, *BODY, OBSTACLE, *CONTACT)),
-    ],
-)
-def test_a_scene_loads_what_it_declares_and_no_more_whoever_solves_it(scene, present, absent):
-    modules = loaded(CELL, scene, "simulation,lbfgs-5,vbd-5,xpbd-10")
-    assert set(present) <= modules
-    assert not modules & set(absent), modules & set(absent)
 
 
 def test_solvers_of_a_dressed_body_load_no_network_library(tmp_path):

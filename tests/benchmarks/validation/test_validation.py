@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from benchmarks.validation.case import Case, cases_of, known_answer
+from benchmarks.validation.case import Case
 from benchmarks.validation.registry import KNOWN_ANSWERS
 from tests.benchmarks.plan.planned import planned
 
@@ -55,21 +55,3 @@ def test_how_a_number_is_judged(number, expected, tolerance, status):
     )  # fmt: skip
     row = case.run()
     assert row.status == status and (status == "ok" or row.reason) and row.tolerance == tolerance
-
-
-@known_answer(["planted_sum", "planted_exact"], tolerance=0.5, reason="planted")
-@known_answer({"planted_option": {"sign": -1.0}}, smoke=False, expected=3.0, reason="planted")
-def two_at_once(sign: float = 1.0) -> dict[str, object]:
-    """Return the planted numbers of several cases."""
-    return {"planted_sum": (sign, 1.2), "planted_exact": 2.0, "planted_option": 2.0 + sign}
-
-
-def test_a_declaration_stands_on_its_function():
-    option, total, _ = cases = cases_of(__name__)
-    assert [case.name for case in cases] == ["planted_option", "planted_sum", "planted_exact"]
-    assert [case.smoke for case in cases] == [False, True, True]
-    assert total.description == "planted numbers of several cases"
-    assert option.description == "planted numbers of several cases: sign = -1.0"
-    rows = [(row.value, row.expected, row.status) for row in (case.run() for case in cases)]
-    assert rows[:2] == [(1.0, 3.0, "ok"), (1.0, 1.2, "ok")]
-    assert rows[2] == (2.0, None, "failed")  # a tolerance, but nothing to compare with
