@@ -46,6 +46,7 @@ BREACHES = {  # a line of run(): what is said of it
     "x[2:, -1] += np.random.default_rng().random(3)": "a second run gives other positions",
     "x[2:, -1] += self.seed": "another seed gives other positions, by 1 m: say seeded=True",
     "x = self.__dict__.setdefault('x', x)": "each call of run() has to do all of the work",
+    "m = scene.cloth.masses; m.flags.writeable = True; m[0] *= 2": "alters the scene: cloth.masses: copy",
     "raise RuntimeError('broken on\\npurpose')": "RuntimeError: broken on purpose (",
 }
 JUDGED = """

@@ -163,6 +163,21 @@ def test_segments_of_a_recording_are_no_independent_motions(alike, monkeypatch):
         assert held() < 0.85
 
 
+def test_the_same_numbers_give_the_same_interval_and_the_interval_agrees_with_the_p_value():
+    random = np.random.default_rng(5)
+    spread = {"motions": 1.0, "seeds": 1.0, "rest": 0.2}
+    signs = set()
+    for _ in range(40):
+        one, other = random_means(random, 4, 3, spread, True)
+        comparison = effect(one, other)
+        low, high = comparison.interval
+        signs.add(comparison.p_value() < 0.05)
+        assert (comparison.p_value() < 0.05) == (not low <= float(comparison.scale == RATIO) <= high)
+    assert signs == {True, False}
+    effects._weights.cache_clear()
+    assert effect(one, other) == comparison
+
+
 def test_positive_numbers_are_compared_by_their_factors():
     sound, broken = mean_over((0.36, 0.35, 0.37)), mean_over((1e7, 2e3, 6e6), "pbns")
     ratio = effect(sound, broken)
