@@ -10,7 +10,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
 from pathlib import Path
 
@@ -54,7 +54,10 @@ class Dask:
         self.scheduler.kill()
         self.scheduler.wait()
         for worker in self.workers:
-            worker.wait(30)
+            with suppress(subprocess.TimeoutExpired):  # one that had not yet found it looks for it without end
+                worker.wait(5)
+            worker.kill()
+            worker.wait()
         self.workers.clear()
         self.start_scheduler(int(self.address.rpartition(":")[2]))
 
