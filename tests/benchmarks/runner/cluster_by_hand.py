@@ -54,7 +54,7 @@ class Dask:
         self.scheduler.kill()
         self.scheduler.wait()
         for worker in self.workers:
-            with suppress(subprocess.TimeoutExpired):  # one that had not yet found it looks for it without end
+            with suppress(subprocess.TimeoutExpired):  # one that had not found it yet goes on looking
                 worker.wait(5)
             worker.kill()
             worker.wait()
