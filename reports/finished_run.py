@@ -188,13 +188,13 @@ class Run:
 
     @property
     def warnings(self) -> list[str]:
-        """What a reader of the numbers has to know first: times of two machines, files that were edited."""
+        """Return what a reader has to know first: times of several machines, files that were edited."""
         times = self.frame[self.frame["unit"].isin(("s", "ms")) & self.frame["value"].notna()]
         machines = sorted(set(times["hardware"]) - {""})
-        found = [f"Times are of several machines: {', '.join(machines)}"] if len(machines) > 1 else []
+        remarks = [f"Times are of several machines: {', '.join(machines)}"] if len(machines) > 1 else []
         if self.changed:
-            found.append(f"Not as the run wrote them: {shorten(', '.join(self.changed), 100)}")
-        return found
+            remarks.append(f"Not as the run wrote them: {shorten(', '.join(self.changed), 100)}")
+        return remarks
 
     def standing_apart(self, frame: pd.DataFrame) -> set[str]:
         """Return the ablations among these rows whose base has a usable number: they have their own table."""

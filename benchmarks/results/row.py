@@ -131,7 +131,6 @@ class Row:
 
 COLUMNS = tuple(field.name for field in dataclasses.fields(Row))
 OPTIONAL_NUMBERS = ("value", "expected", "tolerance", "uncertainty", "level")
-LONGEST_NAME = 150  # bytes: files are named after it
 _NO_FORMULA = re.compile(r"-|[+-]?[0-9.]+(e[+-]?[0-9]+)?")  # a dash, or a number
 
 

@@ -149,7 +149,8 @@ def draw_points(
 
 def _least(points: Sequence[Point], band: float) -> float:
     """Return the error below which none is drawn: what is within the reference's needs no decades."""
-    return max(max(point.error for point in points) * 10.0**-DECADES, band / 10.0)
+    largest = max((point.error for point in points), default=0.0)
+    return max(largest * 10.0**-DECADES, band / 10.0)
 
 
 def _draw_marker(axes: Axes, point: Point, marker: str, colour: str, *, pale: bool) -> None:
@@ -176,18 +177,22 @@ def error_of_page_one(run: Run) -> Iterator[Drawing]:
         for name in ERRORS:
             points = error_points(run, rows, name)
             band = indistinct(run, rows, name)
-            if len(points) > 1 and sum(point.error > _least(points, band) for point in points) > 1:
-                yield _draw_page_one(run, rows, run.metrics[name], points)
+            if sum(point.error > _least(points, band) for point in points) > 1:
+                yield _draw_page_one(run, rows, run.metrics[name], points, band)
                 return
 
 
-def _draw_page_one(run: Run, rows: pd.DataFrame, metric: Metric, points: Sequence[Point]) -> Drawing:
-    """Draw one error of a scene in a wide panel, solvers stopped early as one curve."""
+def _draw_page_one(
+    run: Run, rows: pd.DataFrame, metric: Metric, points: Sequence[Point], band: float
+) -> Drawing:
+    """Draw one error of a scene in a wide panel, solvers stopped early as one curve.
+
+    band: error below which differences are inconclusive.
+    """
     time = run_time(rows)
     figure, (axes,) = new_panels(1)
     curves = curves_of(run, points)
     reference = value_of(rows, run.reference, time)
-    band = indistinct(run, rows, metric.name)
     below = draw_points(axes, run, curves, reference, band)
     entries = [curve.look for curve in curves]
     if reference:
