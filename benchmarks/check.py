@@ -129,7 +129,7 @@ def faults_of(plan: Plan) -> Iterator[tuple[str, str]]:
     runner = Runner([checked(task) for task in tasks_of(replace(plan, cells=cells))], Cache(run))
     runner.run(Executor(run, plan.open_assets() if plan.garments else None, plan.workers))
     for cell in cells:
-        ids = (cell.task_id, cell.batch_id, cell.metrics_id)
+        ids = (cell.id(), cell.id("batch"), cell.id("metrics"))
         outcomes = [runner.outcomes.get(id, Outcome()) for id in ids]
         reasons = (o.reason for o in outcomes if o.failed or o.status == "failed")
         fault = next(reasons, "").removeprefix(f"{ContractError.__name__}: ")

@@ -42,29 +42,19 @@ class Cell:
         """Scene, method and seed, by which RunFolder names its files."""
         return self.scene.name, self.method, self.seed
 
-    @property
-    def task_id(self) -> TaskId:
-        """Id of the task that runs the cell."""
-        return "cell", self.name
-
-    @property
-    def metrics_id(self) -> TaskId:
-        """Id of the task that measures the cell's trajectory."""
-        return "metrics", self.name
-
-    @property
-    def batch_id(self) -> TaskId:
-        """Id of the task that times many bodies at once."""
-        return "batch", self.name
-
-    def repeat_id(self, number: int) -> TaskId:
-        """Return the id of a repeat for its time alone; `number` counts from 1."""
-        return "repeat", f"{self.name}-{number}"
+    def id(self, kind: str = "cell", number: int = 0) -> TaskId:
+        """Return the id of a task of the cell: cell, batch, metrics, or the repeat of that number, from 1."""
+        return kind, self.name + (f"-{number}" if number else "")
 
     @property
     def timed(self) -> bool:
         """True if its costs are measured; other cells run side by side."""
         return self.scene.timed and self.entry.timed
+
+
+def id_of(kind: str, scene: Scene) -> TaskId:
+    """Return the id of a task of a scene: start, which settles its garment, or quasi-static."""
+    return kind, flat(scene.name)
 
 
 def flat(name: str) -> str:

@@ -40,16 +40,6 @@ class Cached:
     content: str = "out of date"
 
 
-def dependencies(task: Task) -> dict[str, str]:
-    """Return name -> digest or version of each input, folder of code and package of a task."""
-    return digests_of(task.inputs) | software(*task.code)
-
-
-def digests_of(inputs: Mapping[str, Any]) -> dict[str, str]:
-    """Return name -> digest of each input."""
-    return {name: digest(value) for name, value in inputs.items()}
-
-
 class Cache:
     """Entries of one run's folder. retry: whether failed tasks are done again; origin: see Outcome."""
 
@@ -70,7 +60,7 @@ class Cache:
             return Cached("missing: its entry is damaged or of another version")
         if damage := damaged(self.folder.path, entry["files"]):
             return Cached(f"missing: {damage}")
-        now, before = dependencies(task) | _read(task, others), entry["parts"]
+        now, before = dependencies(task, others), entry["parts"]
         if changed := [name for name in now | before if now.get(name) != before.get(name)]:
             return Cached("stale: " + ", ".join(changed[:3]) + (", ..." if len(changed) > 3 else ""))
         files = entry["files"]
@@ -85,7 +75,7 @@ class Cache:
         entry = {
             "format": FORMAT,
             "task": task.title,
-            "parts": dependencies(task) | _read(task, others),
+            "parts": dependencies(task, others),
             "origin": outcome.origin,
             "files": files,
             "outcome": {name: getattr(outcome, name) for name in _KEPT},
@@ -108,10 +98,11 @@ class Cache:
 _KEPT = ("status", "reason", "failed", "result", "seconds")
 
 
-def _read(task: Task, others: Mapping[TaskId, Cached]) -> dict[str, str]:
-    """Return the content of each task that a task reads; empty where it has no entry."""
-    ids = (*task.needs, *task.reads)
-    return {" ".join(id): others[id].content if id in others else "" for id in ids}
+def dependencies(task: Task, others: Mapping[TaskId, Cached]) -> dict[str, str]:
+    """Return name -> digest or version of each input, folder of code, package and task that a task reads."""
+    inputs = {name: digest(value) for name, value in task.inputs.items()}
+    read = {" ".join(id): others.get(id, Cached(content="")).content for id in (*task.needs, *task.reads)}
+    return inputs | software(*task.code) | read
 
 
 def _content(entry: Mapping[str, Any]) -> str:

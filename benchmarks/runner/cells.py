@@ -70,14 +70,7 @@ def times(cell: Cell, reading: Reading, frames: list[np.ndarray]) -> dict[str, f
 
 
 def run_cell(cell: Cell, least: float, context: Context, needed: Needed) -> Outcome:
-    """Return the outcome of a cell: its trajectory, timed, and the time of its inputs.
-
-    Args:
-        cell: the cell.
-        least: [s] to be measured.
-        context: of the process.
-        needed: not read; files of the settled start and of the network lie in the run's folder.
-    """
+    """Return the outcome of a cell: its trajectory, timed for `least` seconds, and the time of its inputs."""
     try:
         return compute_cell(cell, least, context)
     except Exception as error:
@@ -147,7 +140,7 @@ def time_batch(cell: Cell, least: float, context: Context, needed: Needed) -> Ou
 
 def repeat_cell(longest: float, cell: Cell, least: float, context: Context, needed: Needed) -> Outcome:
     """Return the time of one more run of a cell, whose first did not take longer than `longest` [s]."""
-    if needed[cell.task_id].result["seconds"] > longest:
+    if needed[cell.id()].result["seconds"] > longest:
         return Outcome("skipped", "the first run took too long")
     _, reading, frames = timed(prepared_method(cell, context), least)
     if reading.complaint:

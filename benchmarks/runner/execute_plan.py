@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import fcntl
 import os
 import sys
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager, suppress
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,7 +46,8 @@ def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]]) -> str:
 def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) -> int:
     """Run the plan, with its assets where they have been made; then make its report unless that is unwanted.
 
-    Returns 0 when all ended well, 1 when something failed or there is no report.
+    Returns 0 when all ended well, 1 when something failed or there is no report. Raises RunRefused where the
+    plan's cluster is gone.
     """
     tasks = tasks_of(plan)
     log = RunLog(plan)
@@ -55,7 +57,12 @@ def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) ->
             assets = log.open_assets(assets)
         except ValueError as error:  # all dressed scenes fail, for the same reason; the others go on
             runner.refuse(("start", "data", "clips", "network"), one_line(error))
-    runner.run(executor_of(plan, log.folder, assets), log)
+    cluster = None
+    if plan.scheduler:
+        from benchmarks.runner.cluster import Cluster  # loads dask
+
+        cluster = Cluster(log.folder, assets, plan.scheduler)
+    runner.run(Executor(log.folder, assets, plan.workers, cluster), log)
     rows = rows_of(plan, runner.tasks, runner.outcomes)
     log.write_rows(rows)
     log.note_outcomes(runner)
@@ -75,15 +82,6 @@ def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) ->
     if report and answer is not None:
         print(log.folder.report_path.resolve(), flush=True)
     return 0 if answer is not None and not failures else 1
-
-
-def executor_of(plan: Plan, folder: RunFolder, assets: Assets | None) -> Executor:
-    """Return the executor of the plan's tasks. Raises RunRefused where its cluster is gone."""
-    if not plan.scheduler:
-        return Executor(folder, assets, plan.workers)
-    from benchmarks.runner.cluster import Cluster  # loads dask
-
-    return Executor(folder, assets, plan.workers, Cluster(folder, assets, plan.scheduler))
 
 
 def check_roll_outs(plan: Plan) -> Assets | None:
@@ -137,19 +135,15 @@ def make_report(log: RunLog) -> str | None:
 def held(folder: Path) -> Iterator[None]:
     """Hold a folder, made where it is not there. Raises RunRefused where another run, or a file, has it.
 
-    A folder made here that stayed empty, because the request was refused, is removed.
     The lock lies on the folder itself and leaves no file. The system releases it with the process, however
     that ended. Where the system or its file system has no such locks nothing is held, and that is said.
     """
-    made = not folder.exists()
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:  # as where a file is in the way
         raise RunRefused(f"--out {folder}: cannot be made ({error.strerror}); name another folder") from None
     with ExitStack() as closing:
         try:
-            import fcntl
-
             hold = os.open(folder, os.O_RDONLY)
             closing.callback(os.close, hold)
             fcntl.flock(hold, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -157,20 +151,23 @@ def held(folder: Path) -> Iterator[None]:
             raise RunRefused(
                 f"--out {folder}: another run is going on there; wait for its end or name another folder"
             ) from None
-        except (ImportError, OSError):
+        except OSError:
             print(f"{folder}: cannot be locked here; let no other run use it", file=sys.stderr)
-        try:
-            yield
-        finally:
-            if made:
-                with suppress(OSError):  # not empty
-                    folder.rmdir()
+        yield
 
 
 def describe(plan: Plan) -> str:
     """Return the plan in a few lines, and one line for each task. Starts nothing, writes nothing."""
     folder = RunFolder(plan.folder / "none" if plan.fresh else plan.folder)
-    lines, stage = _head(plan), ""
+    skipped, stage = sum(not runs(cell) for cell in plan.cells), ""
+    lines = [
+        f"preset {plan.preset.name}: {plan.preset.description}",
+        f"folder {plan.folder}",
+        f"suites {', '.join(plan.suites)}; seeds {', '.join(map(str, plan.seeds))}; device {plan.device}; "
+        f"{plan.scheduler or f'{plan.workers} workers'}, timed cells alone here",
+        *(str(file.path) for file in (plan.inputs.body, plan.inputs.garment) if file),
+        f"{len(plan.cells)} cells, {skipped} skipped, {len(plan.cases)} cases",
+    ]
     counts: Counter[str] = Counter()
     for task, found in Runner(tasks_of(plan), Cache(folder, retry=plan.retry)).preview():
         if task.stage != stage:
@@ -185,16 +182,3 @@ def describe(plan: Plan) -> str:
         lines.append(f"  {task.title}: {line}")
         counts[state] += 1
     return "\n".join([*lines, f"{counts['run']} tasks to run; {counts['cached']} cached"])
-
-
-def _head(plan: Plan) -> list[str]:
-    skipped = sum(not runs(cell) for cell in plan.cells)
-    files = [str(file.path) for file in (plan.inputs.body, plan.inputs.garment) if file]
-    return [
-        f"preset {plan.preset.name}: {plan.preset.description}",
-        f"folder {plan.folder}",
-        f"suites {', '.join(plan.suites)}; seeds {', '.join(map(str, plan.seeds))}; device {plan.device}; "
-        f"{plan.scheduler or f'{plan.workers} workers'}, timed cells alone here",
-        *files,
-        f"{len(plan.cells)} cells, {skipped} skipped, {len(plan.cases)} cases",
-    ]

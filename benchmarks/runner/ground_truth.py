@@ -31,13 +31,19 @@ def settle_start(scene: Scene, context: Context, needed: Needed) -> Outcome:
     """
     import numpy as np
 
+    from reference_sim import Trajectory
     from reference_sim.files.array_file import write_array
 
     built, run, shared = scene.build(context.assets), context.folder, scene.start_of
     assert built.obstacle is not None
     with replacing(run.body_path(scene.name)) as temporary:
         write_array(temporary, built.obstacle.positions)
-    write_body(run, built)
+    Trajectory(
+        positions=built.obstacle.positions.astype(np.float32),  # for the eye: half the size
+        faces=built.obstacle.faces,
+        times=np.arange(built.frames) * built.dt,
+        provenance={"what": "the body of this scene"},
+    ).save(run.trajectory_path(scene.name, "body"))
     with replacing(run.start_path(scene.name)) as temporary:
         write_array(temporary, np.load(run.start_path(shared)) if shared else built.start_state)
     return Outcome(files=files_of_start(scene, run))
@@ -48,21 +54,6 @@ def files_of_start(scene: Scene, run: RunFolder) -> tuple[str, ...]:
     name = scene.name
     paths = run.start_path(name), run.body_path(name), run.trajectory_path(name, "body")
     return tuple(map(run.relative, paths))
-
-
-def write_body(run: RunFolder, scene: BuiltScene) -> None:
-    """trajectories/<scene>/body.vtkhdf, to look at the garments upon."""
-    import numpy as np
-
-    from reference_sim import Trajectory
-
-    assert scene.obstacle is not None
-    Trajectory(
-        positions=scene.obstacle.positions.astype(np.float32),  # for the eye: half the size
-        faces=scene.obstacle.faces,
-        times=np.arange(scene.frames) * scene.dt,
-        provenance={"what": "the body of this scene"},
-    ).save(run.trajectory_path(scene.name, "body"))
 
 
 def simulate_motion(scene: Scene, entry: MethodEntry, context: Context, needed: Needed) -> Outcome:
@@ -88,14 +79,8 @@ def simulate_clips(
 ) -> Outcome:
     """Write the vertices of those clips whose simulation, settled like a motion's, is whole and converged.
 
-    Args:
-        scene: that of any motion in the garment.
-        entry: method that simulates.
-        motions: the training motions that the clips are mixed from.
-        part: number of these clips: those that `part` + 1 augmented frames for each original one have, and
-            `part` have not.
-        context: of the process.
-        needed: not read.
+    The clips are mixed from `motions`: those that `part` + 1 augmented frames for each original one have, and
+    `part` have not. The scene is that of any motion in the garment.
     """
     import numpy as np
 

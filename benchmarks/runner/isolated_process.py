@@ -151,10 +151,9 @@ def how_it_ended(code: int) -> tuple[str, str]:
 
 
 def end_group(pid: int) -> None:
-    """Kill the process group that `pid` led or leads, where the system has groups and this one exists."""
-    if hasattr(os, "killpg"):
-        with suppress(ProcessLookupError, PermissionError):
-            os.killpg(pid, signal.SIGKILL)
+    """Kill the process group that `pid` led or leads, where it exists."""
+    with suppress(ProcessLookupError, PermissionError):
+        os.killpg(pid, signal.SIGKILL)
 
 
 # --- in the process ----------------------------------------------------------------------------------------
@@ -171,19 +170,13 @@ def _serve(pipe: Connection, folder: RunFolder, assets: Assets | None) -> None:
             return
         try:
             answer = function(context, *arguments)
-        except SystemExit:
-            raise
         except BaseException as error:  # a user's code may raise any: interrupts are ignored here
-            answer = _failure(error)
+            try:
+                answer = failure(error)
+            except RunStopped as stop:
+                answer = stop
         sys.stderr.flush()
         pipe.send(answer)
-
-
-def _failure(error: BaseException) -> Outcome | RunStopped:
-    try:
-        return failure(error)
-    except RunStopped as stop:
-        return stop
 
 
 def lead_a_group() -> None:
@@ -192,8 +185,7 @@ def lead_a_group() -> None:
     The parent alone answers an interrupt; it ends its processes.
     """
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if hasattr(os, "setpgrp"):
-        os.setpgrp()
+    os.setpgrp()
 
     def follow() -> None:
         if (parent := multiprocessing.parent_process()) is not None:

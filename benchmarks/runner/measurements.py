@@ -12,13 +12,12 @@ import numpy as np
 
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts, measurements_in
 from benchmarks.metrics import MEASUREMENTS, find_metric, measured_in
-from benchmarks.plan.cell import Cell, TaskId, flat
+from benchmarks.plan.cell import Cell, id_of
 from benchmarks.results.protocol import spread
 from benchmarks.results.row import STATUSES, USABLE
 from benchmarks.results.run_folder import SECONDS
 from benchmarks.runner.cells import build_scene
 from benchmarks.runner.task import Context, Needed, Outcome, one_line
-from benchmarks.scene import Scene
 from reference_sim.files.atomic_files import replacing
 
 
@@ -29,12 +28,11 @@ def measure_cell(
     """Measure the trajectory, and write energies of each frame and other curves beside it.
 
     Args:
-        cell: the cell.
-        cells: all of the scene, in the order of their roll-outs; those whose outcomes are given are compared
-            with.
+        cell: what is measured.
+        cells: all of the scene, in the order of their roll-outs; those that are needed are compared with.
         gap_samples: frames in which the energy gap is measured.
         outside: files of metrics that are not the project's, measured in every scene.
-        context: of the process; the roll-outs of a batch share search trees, and the energies of references.
+        context: the roll-outs of a batch share search trees, and the energies of references.
         needed: outcomes of the cells, of the quasi-static solution, and of the method in another scene.
     """
     if "roll-outs" not in context.memo:
@@ -42,7 +40,7 @@ def measure_cell(
     roll_out, folder = context.memo["roll-outs"][cell], context.folder
     if cell.scene.counterpart:
         other = replace(cell, scene=replace(cell.scene, name=cell.scene.counterpart))
-        if needed.get(other.task_id, Outcome("skipped")).status in USABLE:
+        if needed.get(other.id(), Outcome("skipped")).status in USABLE:
             roll_out.counterpart = _positions(folder.trajectory_path(*other.key))
     metrics, curves, (status, reason) = measured(roll_out, cell.scene.metrics, outside)
     path = folder.curves_path(*cell.key)
@@ -61,11 +59,11 @@ def roll_outs_of(
 
     folder, scene = context.folder, cells[0].scene
     group = SceneRollOuts(build_scene(scene, context), gap_samples=gap_samples)
-    if quasi_static_id(scene) in needed:
+    if id_of("quasi-static", scene) in needed:
         group.quasi_static = _positions(folder.quasi_static_path(scene.name))
     roll_outs = {}
     for cell in cells:
-        outcome = needed.get(cell.task_id)
+        outcome = needed.get(cell.id())
         if outcome is not None and outcome.files:
             still = folder.quasi_static_path(*cell.key) if len(outcome.files) > 1 else None
             roll_outs[cell] = RollOut(
@@ -76,11 +74,6 @@ def roll_outs_of(
             if not cell.entry.other_mesh:  # others are measured together, vertex by vertex
                 group.roll_outs.append(roll_outs[cell])
     return roll_outs
-
-
-def quasi_static_id(scene: Scene) -> TaskId:
-    """Return the id of the task that simulates each frame of a scene held still."""
-    return "quasi-static", flat(scene.name)
 
 
 def measured(

@@ -129,12 +129,25 @@ def train(job: NetworkTraining, context: Context, needed: Needed) -> Outcome:
 
 
 def _outcome(model: TrainedModel, job: NetworkTraining, run: RunFolder, facts: dict[str, Any]) -> Outcome:
-    """Write the model; the outcome names the machine that trained it."""
+    """Write the model; the outcome says how it was trained, and names the machine that trained it."""
     path = job.path(run)
     path.parent.mkdir(parents=True, exist_ok=True)
     model.save(path)
+    result = {
+        "recipe": model.recipe.name,
+        "left_out": model.origin["left_out"],
+        "clips_left_out": model.origin["clips_left_out"],
+        "frames": model.summary.get("training_frames", 0),
+        "seconds": model.seconds,
+        "setup_seconds": model.setup_seconds,
+        "megabytes": model.megabytes,
+        "steps": model.steps,
+        **{name: model.summary[name] for name in INCIDENTS if name in model.summary},
+        "validation": model.summary.get("validation", {}),
+        "last": dict(model.history[-1]) if model.history else {},
+    }
     origin = {"hardware": provenance.hardware_line(model.origin["hardware"])}
-    return Outcome(result=facts_of(model) | facts, files=(run.relative(path),), origin=origin)
+    return Outcome(result=result | facts, files=(run.relative(path),), origin=origin)
 
 
 def origin_of(job: NetworkTraining, needed: Needed, *, left_out: list[str]) -> dict[str, Any]:
@@ -174,23 +187,6 @@ def mixed_clips(
     vertices = len(assets.garments[job.network.garment].rest_positions)
     clips = make_shared_clips(assets.named(job.motions), len(job.clips), vertices=vertices)
     return [clip for clip in clips if clip.name in vertices_of], vertices_of
-
-
-def facts_of(model: TrainedModel) -> dict[str, Any]:
-    """Return the result of the task that trained a model, or took it from a file."""
-    return {
-        "recipe": model.recipe.name,
-        "left_out": model.origin["left_out"],
-        "clips_left_out": model.origin["clips_left_out"],
-        "frames": model.summary.get("training_frames", 0),
-        "seconds": model.seconds,
-        "setup_seconds": model.setup_seconds,
-        "megabytes": model.megabytes,
-        "steps": model.steps,
-        **{name: model.summary[name] for name in INCIDENTS if name in model.summary},
-        "validation": model.summary.get("validation", {}),
-        "last": dict(model.history[-1]) if model.history else {},
-    }
 
 
 NAME = "pretrained"  # in the result of a task: name of the file that its network is of

@@ -36,10 +36,10 @@ def rows_of(plan: Plan, tasks: Sequence[Task], outcomes: Outcomes) -> list[Row]:
 
 def rows_of_cell(cell: Cell, plan: Plan, tasks: Mapping[TaskId, Task], outcomes: Outcomes) -> Iterator[Row]:
     """Yield the rows of a cell in each of its suites; a cell without metrics is one row with its reason."""
-    outcome = outcomes.get(cell.task_id)
+    outcome = outcomes.get(cell.id())
     if outcome is None:
         return
-    measured = outcomes.get(cell.metrics_id)
+    measured = outcomes.get(cell.id("metrics"))
     trained, ids = network_tasks(cell, tasks)
     network = outcomes.get(trained, Outcome()) if trained else Outcome()
     taught_by = [outcomes[id] for id in ids if id in outcomes]
@@ -61,20 +61,19 @@ def rows_of_cell(cell: Cell, plan: Plan, tasks: Mapping[TaskId, Task], outcomes:
                 metrics["cost/frame"] = declared_ms
             if cell.scene.timed:
                 metrics |= model_costs(network, taught_by)
-            reason = "; ".join(filter(None, (reason or not_learned(network), taken(network))))
-    batch = outcomes.get(cell.batch_id, Outcome())
+            reason = with_remarks(reason, network)
+    batch = outcomes.get(cell.id("batch"), Outcome())
     if batch.result.get("complaint"):  # it worked on behind the clock in its run too
         status, reason, metrics = "failed", f"many at once: {batch.status}: {batch.reason}", {}
-    scene, entry, protocol = cell.scene, cell.entry, protocol_of(cell, plan)
+    scene, entry = cell.scene, cell.entry
     # Of a cell without numbers: nobody has asked for a time where none is taken.
     untimed = "energy" in (scene.metrics or ()) and not scene.timed
-    # A row of an earlier run keeps the protocol under which it was made.
-    origin = {"protocol": protocol, **outcome.origin, **({"protocol": OWN} if protocol == OWN else {})}
     base = Row(
         suite="", scene=scene.name, method=cell.method, seed=cell.seed,
         metric="energy/total" if untimed else "cost/frame", unit="J" if untimed else "ms",
         status=status if status != "ok" else "failed", reason=reason, terms=outcome.result.get("terms", ""),
-        dtype=entry.dtype, **origin, garment=scene.garment, motion=scene.motion, part=scene.part,
+        **_origin(outcome, protocol_of(cell, plan)),
+        dtype=entry.dtype, garment=scene.garment, motion=scene.motion, part=scene.part,
         family=entry.reporting.family or entry.name, level=entry.reporting.level, role=entry.role,
         base=entry.reporting.base, seeded=entry.seeded, pairing_group=entry.reporting.pairing_group,
     )  # fmt: skip
@@ -119,13 +118,13 @@ def clock_costs(cell: Cell, repeats: int, outcomes: Outcomes) -> tuple[dict[str,
     Times are medians of the repeats, but for those of inputs; these and the peak are of the first run. A
     frame's time is that of the whole run over the frames computed.
     """
-    first, remark = outcomes[cell.task_id], ""
-    batch = outcomes.get(cell.batch_id, Outcome("skipped"))
+    first, remark = outcomes[cell.id()], ""
+    batch = outcomes.get(cell.id("batch"), Outcome("skipped"))
     if batch.status not in ("ok", "skipped"):
         remark = f"many at once: {batch.status}: {batch.reason}"
     results = [first.result]
     for number in range(1, repeats):
-        again = outcomes.get(cell.repeat_id(number), Outcome("skipped"))
+        again = outcomes.get(cell.id("repeat", number), Outcome("skipped"))
         if again.status == "ok":
             results.append(again.result)
         elif again.status != "skipped":
@@ -147,7 +146,7 @@ def clock_costs(cell: Cell, repeats: int, outcomes: Outcomes) -> tuple[dict[str,
 
 def network_tasks(cell: Cell, tasks: Mapping[TaskId, Task]) -> tuple[TaskId | None, tuple[TaskId, ...]]:
     """Return the id of the training of a cell's network, None without one, and of its simulated data."""
-    needs = tasks[cell.task_id].needs if cell.task_id in tasks else ()
+    needs = tasks[cell.id()].needs if cell.id() in tasks else ()
     trained = next((id for id in needs if id[0] == "network"), None)
     return trained, tasks[trained].reads if trained else ()
 
@@ -176,17 +175,13 @@ def machines_of(network: Outcome, taught_by: Sequence[Outcome]) -> dict[str, str
     return {metric: " and ".join(hardware) for metric, hardware in lines.items() if hardware}
 
 
-def not_learned(network: Outcome) -> str:
-    """Return a remark where a simulation failed, so that the cell's network learned without it."""
-    if not network.result.get("left_out"):
-        return ""
-    return f"its network learned without {', '.join(network.result['left_out'])}: no simulation is whole"
-
-
-def taken(network: Outcome) -> str:
-    """Return a remark where the cell's network is of a file."""
+def with_remarks(reason: str, network: Outcome) -> str:
+    """Return the reason of a cell, or what its network learned without; and whether this is of a file."""
     facts = network.result
-    return f"{PRETRAINED} {facts[NAME]} of {facts['trained_at']}" if NAME in facts else ""
+    if not reason and facts.get("left_out"):
+        reason = f"its network learned without {', '.join(facts['left_out'])}: no simulation is whole"
+    taken = f"{PRETRAINED} {facts[NAME]} of {facts['trained_at']}" if NAME in facts else ""
+    return "; ".join(filter(None, (reason, taken)))
 
 
 def _rows_of_case(case: Case, outcomes: Outcomes) -> Iterator[Row]:
@@ -204,9 +199,13 @@ def _rows_of_case(case: Case, outcomes: Outcomes) -> Iterator[Row]:
     if outcome.result:
         row = Row(**outcome.result)
     unit = row.unit or find_metric(row.metric).unit  # a case says its unit itself
-    protocol = protocol_of_case(row.scene, row.metric)
-    origin = {"protocol": protocol, **outcome.origin, **({"protocol": OWN} if protocol == OWN else {})}
+    origin = _origin(outcome, protocol_of_case(row.scene, row.metric))
     yield dataclasses.replace(row, **origin, unit=unit)
+
+
+def _origin(outcome: Outcome, protocol: str) -> dict[str, Any]:
+    """Return the origin of an outcome's rows; those of an earlier run keep its protocol, unless it is OWN."""
+    return {"protocol": protocol, **outcome.origin, **({"protocol": OWN} if protocol == OWN else {})}
 
 
 def with_uncertainty(rows: Sequence[Row], outside: tuple[str, ...] = ()) -> list[Row]:

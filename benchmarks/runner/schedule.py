@@ -5,9 +5,8 @@ Loads nothing heavy: a dry run makes the same tasks as a run.
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Iterator, Mapping
-from functools import cached_property, partial
+from collections.abc import Callable, Iterator
+from functools import partial
 from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,11 +15,10 @@ from benchmarks import provenance
 from benchmarks.method import MethodEntry, Simulated
 from benchmarks.methods import find_method
 from benchmarks.metric import COMPARED_WITH
-from benchmarks.plan.cell import Cell, TaskId, flat
+from benchmarks.plan.cell import Cell, TaskId, flat, id_of
 from benchmarks.plan.plan import Network, Plan, network_of, runs
 from benchmarks.provenance import digest, digest_of_file, find_module, software
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.cache import digests_of
 from benchmarks.runner.cells import files_of, repeat_cell, run_case, run_cell, time_batch
 from benchmarks.runner.ground_truth import (
     clips_of,
@@ -30,7 +28,7 @@ from benchmarks.runner.ground_truth import (
     simulate_motion,
     simulate_quasi_static,
 )
-from benchmarks.runner.measurements import measure_cell, quasi_static_id
+from benchmarks.runner.measurements import measure_cell
 from benchmarks.runner.networks import LONGEST, NetworkTraining, pretrained_network, take, train
 from benchmarks.runner.task import Outcome, Task
 from benchmarks.scene import Scene
@@ -58,9 +56,7 @@ USERS_OWN = (*MEASURING, "benchmarks/methods")  # what a user's file may import
 
 def declared(entry: MethodEntry | Scene | Case) -> dict[str, Any]:
     """Return what a scene, a method or a case declares, without descriptions; of files their content."""
-    fields = {field.name: getattr(entry, field.name) for field in dataclasses.fields(entry)}
-    kept = {name: value for name, value in fields.items() if name not in ("description", "label")}
-    values = {name: dict(value) if isinstance(value, Mapping) else value for name, value in kept.items()}
+    values = {name: value for name, value in vars(entry).items() if name not in ("description", "label")}
     if isinstance(entry, MethodEntry | Scene):
         values["files"] = {path: digest_of_file(Path(path)) for path in values["files"]}
     return values
@@ -125,7 +121,8 @@ class Schedule:
         return Task(
             kind="start", name=flat(scene.name), label=scene.name, stage="ground truth", silent=True,
             run=partial(settle_start, scene), files=files_of_start(scene, self.folder),
-            needs=(start_of(self._settled_in(scene)),) if scene.start_of else (), **self._of_scene(scene),
+            needs=(id_of("start", self._settled_in(scene)),) if scene.start_of else (),
+            **self._of_scene(scene),
         )  # fmt: skip
 
     def ground_truth(self, network: Network) -> list[Task]:
@@ -183,40 +180,28 @@ class Schedule:
                 )  # fmt: skip
         return Task(
             stage=TRAINED, run=partial(train, job), reads=job.reads, work=job.work,
-            inputs=self._inputs_of(network), code=(*RUNNING, *users_code(network.declared_in)), **fields,
+            inputs=job.inputs, code=(*RUNNING, *users_code(network.declared_in)), **fields,
         )  # fmt: skip
 
     def training(self, network: Network) -> NetworkTraining:
-        """Return how a network is trained."""
-        motions, held_out = self._learned(network)
-        truth = self.ground_truth(network)
-        ids = [task.id for task in truth if task.kind == "data"]
-        inputs = digests_of(self._inputs_of(network))
-        code = software(*RUNNING, *users_code(network.declared_in))
-        return NetworkTraining(
-            network=network, steps=self._steps(network), motions=motions, held_out=held_out,
-            simulated=dict(zip((*motions, *held_out), ids)), device=self.plan.device,
-            clips=tuple(task.id for task in truth if task.kind == "clips"),
-            inputs=inputs, key=digest(inputs | code),
-        )  # fmt: skip
-
-    def _inputs_of(self, network: Network) -> dict[str, Any]:
-        """Return the inputs of a training."""
-        motions, held_out = self._learned(network)
-        return self._machine(self.plan.device) | self._of_body(network.garment) | {
-            "training": [network.name, network.training],
-            "seed": network.seed,
-            "steps": self._steps(network),
+        """Return how a network is trained; one that is to converge has the most steps."""
+        (motions, held_out), chosen = self._learned(network), network.training
+        kind, steps_of = (chosen.kind, chosen.steps_of) if chosen else (network.name, "")
+        steps = self.preset.steps_of(steps_of or network.name, kind)
+        steps *= LONGEST if chosen and chosen.converged else 1
+        inputs = self._machine(self.plan.device) | self._of_body(network.garment) | {
+            "training": [network.name, chosen], "seed": network.seed, "steps": steps,
             "motions": {name: self._motion(name) for name in motions},
             "held out": {name: self._motion(name) for name in held_out},
         }  # fmt: skip
-
-    def _steps(self, network: Network) -> int:
-        """Return the steps of a training, of one that converges the most."""
-        chosen = network.training
-        kind, steps_of = (chosen.kind, chosen.steps_of) if chosen else (network.name, "")
-        steps = self.preset.steps_of(steps_of or network.name, kind)
-        return steps * (LONGEST if chosen and chosen.converged else 1)
+        digests = {name: digest(value) for name, value in inputs.items()}
+        ids = [task.id for task in self.ground_truth(network)]
+        return NetworkTraining(
+            network=network, steps=steps, motions=motions, held_out=held_out, device=self.plan.device,
+            simulated=dict(zip((*motions, *held_out), [id for id in ids if id[0] == "data"])),
+            clips=tuple(id for id in ids if id[0] == "clips"), inputs=digests,
+            key=digest(digests | software(*RUNNING, *users_code(network.declared_in))),
+        )  # fmt: skip
 
     # --- cells ---------------------------------------------------------------------------------------------
 
@@ -228,7 +213,7 @@ class Schedule:
         for cell in cells:
             yield self.cell(cell)
             if cell.entry.batched and runs(cell):
-                yield self._timed(cell, cell.batch_id, time_batch)
+                yield self._timed(cell, cell.id("batch"), time_batch)
         repeated = [cell for cell in cells if "speed" in cell.suites and runs(cell)]
         longest = self.preset.repeat_seconds
         for number in range(1, self.preset.repeats):
@@ -236,7 +221,7 @@ class Schedule:
             for cell in (*repeated[turn:], *repeated[:turn]):
                 inputs = {"least": self._least(cell), "longest": longest}
                 run = partial(repeat_cell, longest)
-                yield self._timed(cell, cell.repeat_id(number), run, inputs=inputs)
+                yield self._timed(cell, cell.id("repeat", number), run, inputs=inputs)
 
     def cell(self, cell: Cell) -> Task:
         """Return the task that runs a cell: alone where it is timed."""
@@ -246,7 +231,7 @@ class Schedule:
             inputs["least"] = self._least(cell)
         if entry.seeded:
             inputs["seed"] = cell.seed
-        needs = (start_of(cell.scene),) if cell.scene.simulated else ()
+        needs = (id_of("start", cell.scene),) if cell.scene.simulated else ()
         if network := network_of(cell):
             needs = (*needs, network.task_id)
         fields: dict[str, Any] = {
@@ -254,7 +239,7 @@ class Schedule:
             **self._of_scene(cell.scene, *code_behind(entry), **inputs),
         }  # fmt: skip
         if cell.timed:
-            return self._timed(cell, cell.task_id, run_cell, **fields)
+            return self._timed(cell, cell.id(), run_cell, **fields)
         return Task(
             kind="cell", name=cell.name, label=cell.label, stage="cells that are not timed",
             run=partial(run_cell, cell, self._least(cell)), batch=cell.scene.name,
@@ -264,7 +249,7 @@ class Schedule:
     def _timed(self, cell: Cell, id: TaskId, run: Callable[..., Outcome], **fields: Any) -> Task:
         """Return the run of a timed cell, or a task that follows it in its process."""
         least = self._least(cell)
-        usual = {"inputs": {"least": least}, "code": RUNNING, "needs": (cell.task_id,)}
+        usual = {"inputs": {"least": least}, "code": RUNNING, "needs": (cell.id(),)}
         more: dict[str, Any] = usual | fields
         return Task(
             kind=id[0], name=id[1], label=cell.label, stage="cells", run=partial(run, cell, least),
@@ -281,9 +266,9 @@ class Schedule:
     def quasi_static(self, scene: Scene) -> Task:
         """Return the task that simulates each frame of a scene held still."""
         return Task(
-            kind="quasi-static", name=quasi_static_id(scene)[1], label=scene.name,
+            kind="quasi-static", name=flat(scene.name), label=scene.name,
             stage="quasi-static answers", silent=True, run=partial(simulate_quasi_static, scene),
-            needs=(start_of(scene),), **self._of_scene(scene),
+            needs=(id_of("start", scene),), **self._of_scene(scene),
         )  # fmt: skip
 
     def metrics(self, cell: Cell) -> Task:
@@ -291,20 +276,20 @@ class Schedule:
         scene, plan, entry = cell.scene, self.plan, cell.entry
         cells = tuple(other for other in plan.cells if other.scene == scene and runs(other))
         compared = (other for other in cells if other.entry.role in COMPARED_WITH)
-        reads = tuple(other.task_id for other in compared if other != cell)
+        reads = tuple(other.id() for other in compared if other != cell)
         if scene.simulated:
-            reads = (*reads, start_of(scene))  # the scene is built from it
+            reads = (*reads, id_of("start", scene))  # the scene is built from it
         if scene.dynamic:
-            reads = (*reads, quasi_static_id(scene))
+            reads = (*reads, id_of("quasi-static", scene))
         wanted = (scene.counterpart, cell.method, cell.seed)
-        reads += tuple(c.task_id for c in plan.cells if (c.scene.name, c.method, c.seed) == wanted)
+        reads += tuple(c.id() for c in plan.cells if (c.scene.name, c.method, c.seed) == wanted)
         method = [
             entry.role, entry.reporting.family, entry.reporting.level, entry.static_known, entry.other_mesh,
         ]  # fmt: skip
         run = partial(measure_cell, cell, cells, self.preset.gap_samples, plan.metrics)
         return Task(
             kind="metrics", name=cell.name, label=cell.label, stage="metrics",
-            run=run, needs=(cell.task_id,), reads=reads, batch=scene.name,
+            run=run, needs=(cell.id(),), reads=reads, batch=scene.name,
             files=(self.folder.relative(self.folder.curves_path(*cell.key)),),
             **self._of_scene(
                 scene, *MEASURING, *users_code(*plan.metrics), suites=sorted(cell.suites),
@@ -325,13 +310,9 @@ class Schedule:
 
     def _machine(self, device: str = "cpu") -> dict[str, Any]:
         """Return the machine, as times of another are not reused. device: of a training; else cpu."""
-        facts = self._hardware if device == self.plan.device else self._hardware | {"accelerator": None}
+        facts = provenance.hardware(device)
         names = ("processor", "python", "accelerator")  # one thread works, however many cores there are
         return {"machine": {name: facts.get(name) for name in names} | {"device": device, "threads": 1}}
-
-    @cached_property
-    def _hardware(self) -> dict[str, Any]:
-        return provenance.hardware(self.plan.device)
 
     def _of_scene(self, scene: Scene, *code: str, **inputs: Any) -> dict[str, Any]:
         """Return inputs and code of a task that builds the scene, these included; its metrics are no part."""
@@ -378,11 +359,6 @@ class Schedule:
         """Return the scene whose settled garment another one starts from."""
         planned = next((s for s in self.plan.scenes if s.name == scene.start_of), None)
         return planned or find_scene(scene.start_of, self.plan.motions.first_garment).at(self.preset)
-
-
-def start_of(scene: Scene) -> TaskId:
-    """Return the id of the task that settles the garment of a scene."""
-    return "start", flat(scene.name)
 
 
 def _label(what: str, entry: MethodEntry) -> str:

@@ -158,5 +158,5 @@ class InProcess:
 def run_in_this_process(patch: pytest.MonkeyPatch) -> None:
     """Let runs do every task in this process: none is begun, and nothing is compiled again."""
     patch.setattr(
-        "benchmarks.runner.execute_plan.Executor", lambda folder, assets, _: InProcess(folder, assets)
+        "benchmarks.runner.execute_plan.Executor", lambda folder, assets, *_: InProcess(folder, assets)
     )

@@ -139,7 +139,7 @@ def test_repeats_take_turns_and_are_kept(tmp_path, monkeypatch):
     repeats = [task.label.split(" x ")[1] for task in calls if task.kind == "repeat"]
     assert repeats == ["newton-1", "newton-4", "simulation", "newton-4", "simulation", "newton-1"]
     cell = plan.cells[0]
-    ids = [cell.task_id, cell.repeat_id(1), cell.repeat_id(2)]
+    ids = [cell.id(), cell.id("repeat", 1), cell.id("repeat", 2)]
     seconds = [runner.outcomes[id].result["seconds"] for id in ids]
     costs, _ = clock_costs(cell, 3, runner.outcomes)
     assert costs["cost/frame"] == pytest.approx(1e3 * sorted(seconds)[1] / 3)
@@ -153,7 +153,7 @@ def test_a_repeat_that_fails_is_said_on_the_rows(tmp_path):
     plan = plan_of(tmp_path, "newton-1", preset=dataclasses.replace(TINY, repeats=2, repeat_seconds=60.0))
     runner = finish(plan, "cells", "metrics")
     crowd = Outcome("failed", "more than one thread", result={"seconds": 0.1})
-    runner.outcomes[plan.cells[0].repeat_id(1)] = crowd
+    runner.outcomes[plan.cells[0].id("repeat", 1)] = crowd
     table = rows(runner, plan)
     assert {row.reason for row in table.values()} == {"repeat 1: failed: more than one thread"}
     assert {row.status for row in table.values()} == {"ok"} and "cost/spread" not in table

@@ -115,8 +115,8 @@ def test_every_row_of_a_pretrained_network_says_so(made, tmp_path):
     (taken,) = (task for task in tasks_of(plan) if task.kind == "network")
     done = taken.run(context(tmp_path), {})
     done = dataclasses.replace(done, origin={"hardware": "a processor of theirs"})
-    outcomes = {cell.task_id: RAN for cell in plan.cells} | {taken.id: done}
-    outcomes |= {cell.metrics_id: Outcome(result={"energy/strain": 0.1}) for cell in plan.cells}
+    outcomes = {cell.id(): RAN for cell in plan.cells} | {taken.id: done}
+    outcomes |= {cell.id("metrics"): Outcome(result={"energy/strain": 0.1}) for cell in plan.cells}
     rows = rows_of(plan, tasks_of(plan), outcomes)
     remark = f"pretrained network pbns-seed0 of {done.result['trained_at']}"
     assert {row.reason for row in rows if row.method == "pbns"} == {remark}

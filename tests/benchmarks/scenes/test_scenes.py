@@ -66,7 +66,7 @@ def test_an_own_body_wears_the_garment_and_makes_stale_what_was_on_another(tmp_p
     path = write_body(tmp_path / "tall.npz", 1.1)
     plans = [planned("full:garments", "--methods", "snug", *more) for more in ((), ("--body", path))]
     for one, other in zip(*map(tasks_of, plans)):
-        assert one.kind not in ("network", "cell") or dependencies(one) != dependencies(other), one.id
+        assert one.kind not in ("network", "cell") or dependencies(one, {}) != dependencies(other, {}), one.id
     heights = []
     for plan in plans:
         assets = open_assets(TINY, [make_motion("walk")], ["tshirt"], inputs=plan.inputs)
