@@ -71,7 +71,6 @@ class Cluster:
         self._futures: set[Future] = set()
         self._stopped = False
         self.rest()
-        self._slots = 1
         if not self.client.nthreads():
             print(f"waiting for workers: dask worker {address} --nthreads 1", file=sys.stderr)
 
@@ -80,25 +79,25 @@ class Cluster:
         """Number of batches that are done at once. Without a worker the first one waits for it."""
         if self.client.status == "running":
             with suppress(OSError):  # no scheduler: the client is looking for it
-                self._slots = max(1, sum(self.client.nthreads().values()))
-        return self._slots
+                return max(1, sum(self.client.nthreads().values()))
+        return 1
 
     def do(self, tasks: Sequence[Task], needed: Needed) -> Iterator[Outcome]:
         """Yield the outcomes of a batch, done by one process where its worker lives.
 
         Raises RunStopped where the cluster is gone or cannot do it.
         """
-        batch, worker = uuid.uuid4().hex, ""
+        worker = ""
         for task in tasks:
-            outcome, worker = self._outcome(task, needed, batch, worker)
+            outcome, worker = self._outcome(task, needed, worker)
             yield outcome
 
-    def _outcome(self, task: Task, needed: Needed, batch: str, near: str) -> tuple[Outcome, str]:
+    def _outcome(self, task: Task, needed: Needed, near: str) -> tuple[Outcome, str]:
         """Return the outcome of a task and the address of its worker. near: of the one that is preferred."""
-        work = self.assets, batch, pickle.dumps((task, needed, software_of(task)))
+        work = pickle.dumps((task, needed, software_of(task)))
         while not self._stopped:
             future = self.client.submit(
-                do_task, *work, key=f"{task.kind}-{uuid.uuid4().hex}", pure=False,
+                do_task, self.assets, work, key=f"{task.kind}-{uuid.uuid4().hex}", pure=False,
                 workers=[near] if near else None, allow_other_workers=bool(near),
             )  # fmt: skip
             self._futures.add(future)
@@ -150,15 +149,14 @@ def software_of(task: Task) -> dict[str, str]:
 
 # --- in a worker -------------------------------------------------------------------------------------------
 
-_processes: dict[int, tuple[Path, str, TaskProcess]] = {}  # of each thread: assets, the last batch, and it
+_processes: dict[int, tuple[Path, TaskProcess]] = {}  # of each thread: path of its assets, and it
 
 
-def do_task(assets: Path, batch: str, work: bytes) -> tuple[Outcome, str]:
+def do_task(assets: Path, work: bytes) -> tuple[Outcome, str]:
     """Do a task; return its outcome and the address of the worker. Raises RunStopped.
 
     Args:
         assets: the pickled assets in the run's folder, which no other run has.
-        batch: key of the batch; its tasks share what a process has in its memo.
         work: the pickled task, the outcomes that it needs, and the command's software_of it.
     """
     from distributed import get_worker
@@ -172,7 +170,7 @@ def do_task(assets: Path, batch: str, work: bytes) -> tuple[Outcome, str]:
     if changed := sorted(name for name, _ in software.items() ^ software_of(task).items()):
         other = f"its software is another ({changed[0]}); install the same there as here"
         raise RunStopped(f"worker {worker.address}: {other}")
-    process = _process_of(assets, batch)
+    process = _process_of(assets)
     with ThreadPoolExecutor(1) as thread:
         future = thread.submit(process.do, task, needed)
         while not wait([future], WATCH).done:
@@ -184,26 +182,24 @@ def do_task(assets: Path, batch: str, work: bytes) -> tuple[Outcome, str]:
     return replace(outcome, origin={"hardware": hardware, **outcome.origin}), worker.address
 
 
-def _process_of(assets: Path, batch: str) -> TaskProcess:
+def _process_of(assets: Path) -> TaskProcess:
     """Return the process of this thread for tasks of the run that has these assets."""
     # A nanny makes its worker a daemon, which may have no processes. Ours end with it by themselves.
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     one_thread()
     thread = threading.get_ident()
-    known, before, process = _processes.get(thread, (None, "", None))
+    known, process = _processes.get(thread, (None, None))
     if process is None or known != assets:
         if process is not None:
             process.close()
         process = TaskProcess(RunFolder(assets.parent), pickle.loads(assets.read_bytes()))
-    elif before != batch:
-        process.forget()
-    _processes[thread] = assets, batch, process
+        _processes[thread] = assets, process
     return process
 
 
 def end_processes(folder: Path) -> None:
     """Kill all processes of a run's folder."""
-    for thread, (assets, _, process) in list(_processes.items()):
+    for thread, (assets, process) in list(_processes.items()):
         if assets.parent == folder:
             process.stop()
             _processes.pop(thread, None)

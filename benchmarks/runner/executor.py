@@ -38,10 +38,7 @@ class LocalProcesses:
         self._idle: list[TaskProcess] = []
 
     def do(self, tasks: Sequence[Task], needed: Needed) -> Iterator[Outcome]:
-        """Yield the outcome of each task of a batch, however it ends; called by several threads.
-
-        One process does them. What a task leaves in the memo is there for its batch alone.
-        """
+        """Yield the outcomes of a batch, done by one process; called by several threads."""
         if self._idle:
             process = self._idle.pop()
         else:
@@ -49,7 +46,6 @@ class LocalProcesses:
             self._all.append(process)
         for task in tasks:
             yield process.do(task, needed)
-        process.forget()
         self._idle.append(process)
 
     def stop(self) -> None:

@@ -22,6 +22,7 @@ from multiprocessing.connection import Connection, wait
 from typing import TYPE_CHECKING, Any
 
 from benchmarks.method import WorkerDied
+from benchmarks.plan.cell import TaskId
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.task import Context, Needed, Outcome, RunStopped, Task, failure
 
@@ -64,7 +65,7 @@ class TaskProcess:
         self._process: Any = None
 
     def do(self, task: Task, needed: Needed) -> Outcome:
-        """Return the task's outcome, however it ends. What it leaves in the memo is there for the next one.
+        """Return the task's outcome, however it ends; what it leaves in the memo is there for its batch.
 
         Raises RunStopped.
         """
@@ -72,18 +73,12 @@ class TaskProcess:
         try:
             outcome = self._call(warm_up, task.warm_up, seconds=COMPILING) if task.warm_up else Outcome()
             if not outcome.failed:
-                outcome = self._call(perform, task.run, needed, seconds=task.deadline)
+                outcome = self._call(perform, task.batch_id, task.run, needed, seconds=task.deadline)
         except Exception as error:
             outcome = failure(error)
         if outcome.status == "timeout":  # of a program, ended by its method: what it has started may run on
             self.close()
         return outcome if outcome.seconds else replace(outcome, seconds=time.perf_counter() - clock)
-
-    def forget(self) -> None:
-        """Empty the memo."""
-        if self._process is not None:
-            with suppress(WorkerDied):
-                self._call(empty_memo, seconds=None)
 
     def _call(self, function: Callable[..., Outcome], *arguments: Any, seconds: float | None) -> Outcome:
         """function(context, *arguments) in the process; both sides must be picklable.
@@ -196,9 +191,14 @@ def lead_a_group() -> None:
     threading.Thread(target=follow, name="follow-parent", daemon=True).start()
 
 
-def perform(context: Context, run: Callable[[Context, Needed], Outcome], needed: Needed) -> Outcome:
-    """Return the outcome of a task, with its time."""
-    clock = time.perf_counter()
+def perform(
+    context: Context, batch: TaskId, run: Callable[[Context, Needed], Outcome], needed: Needed
+) -> Outcome:
+    """Return the outcome of a task of a batch, with its time."""
+    if context.memo and context.batch != batch:
+        context.memo.clear()
+        gc.collect()  # a simulation refers to itself
+    context.batch, clock = batch, time.perf_counter()
     outcome = run(context, needed)
     return replace(outcome, seconds=time.perf_counter() - clock)
 
@@ -206,12 +206,4 @@ def perform(context: Context, run: Callable[[Context, Needed], Outcome], needed:
 def warm_up(context: Context, compile_kernels: Callable[[], None]) -> Outcome:
     """Compile what the first task would otherwise compile within its deadline."""
     compile_kernels()
-    return Outcome()
-
-
-def empty_memo(context: Context) -> Outcome:
-    """Empty the memo of this process."""
-    if context.memo:  # else there is no reason to look through all objects for garbage
-        context.memo.clear()
-        gc.collect()  # a simulation refers to itself
     return Outcome()

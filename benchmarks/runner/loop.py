@@ -177,9 +177,9 @@ def _titles(tasks: Sequence[Task]) -> str:
 
 def _batches(tasks: Sequence[Task]) -> list[list[Task]]:
     """Return the tasks handed out together, by stage, the largest first: so workers end at about one time."""
-    batches: dict[tuple[str, str], list[Task]] = {}
+    batches: dict[TaskId, list[Task]] = {}
     for task in tasks:
-        batches.setdefault((task.kind, task.batch or task.name), []).append(task)
+        batches.setdefault(task.batch_id, []).append(task)
     stages = list(dict.fromkeys(task.stage for task in tasks))
     return sorted(
         batches.values(),

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from benchmarks.method import MethodEntry
 from benchmarks.metrics import find_metric
 from benchmarks.plan.cell import Cell, TaskId
-from benchmarks.plan.plan import Plan, protocol_of, protocol_of_case
+from benchmarks.plan.plan import Plan, network_of, protocol_of, protocol_of_case
 from benchmarks.results.protocol import OWN, is_member, spread
 from benchmarks.results.row import DECLARED, PRETRAINED, Row
 from benchmarks.runner.networks import NAME
@@ -40,9 +40,10 @@ def rows_of_cell(cell: Cell, plan: Plan, tasks: Mapping[TaskId, Task], outcomes:
     if outcome is None:
         return
     measured = outcomes.get(cell.id("metrics"))
-    trained, ids = network_tasks(cell, tasks)
-    network = outcomes.get(trained, Outcome()) if trained else Outcome()
-    taught_by = [outcomes[id] for id in ids if id in outcomes]
+    network, taught_by = Outcome(), list[Outcome]()
+    if (needed := network_of(cell)) and needed.task_id in tasks:
+        network = outcomes.get(needed.task_id, network)
+        taught_by = [outcomes[id] for id in tasks[needed.task_id].reads if id in outcomes]
     metrics: dict[str, Any] = {}  # a number, or the parts of an Estimate
     status, reason = outcome.status, outcome.reason
     if outcome.files:
@@ -142,13 +143,6 @@ def clock_costs(cell: Cell, repeats: int, outcomes: Outcomes) -> tuple[dict[str,
         costs["cost/batch"] = MS * batch.result["seconds"]
     costs["cost/peak"] = first.result["peak"]
     return costs, remark
-
-
-def network_tasks(cell: Cell, tasks: Mapping[TaskId, Task]) -> tuple[TaskId | None, tuple[TaskId, ...]]:
-    """Return the id of the training of a cell's network, None without one, and of its simulated data."""
-    needs = tasks[cell.id()].needs if cell.id() in tasks else ()
-    trained = next((id for id in needs if id[0] == "network"), None)
-    return trained, tasks[trained].reads if trained else ()
 
 
 def model_costs(network: Outcome, taught_by: Sequence[Outcome]) -> dict[str, float]:

@@ -61,11 +61,13 @@ class Context:
         folder: files of the run.
         assets: body, garments and motions; None where no task needs a dressed body.
         memo: kept between the tasks of one batch in this process.
+        batch: their `Task.batch_id`.
     """
 
     folder: RunFolder
     assets: Assets | None = None
     memo: dict[Any, Any] = field(default_factory=dict)
+    batch: TaskId = ("", "")
 
 
 Needed = Mapping[TaskId, Outcome]  # usable outcomes of what a task needs or reads
@@ -120,6 +122,11 @@ class Task:
     def id(self) -> TaskId:
         """Kind and name."""
         return self.kind, self.name
+
+    @property
+    def batch_id(self) -> TaskId:
+        """What its batch is known by: its process has one memo for all of them."""
+        return self.kind if not self.process else "", self.process or self.batch or self.name
 
     @property
     def title(self) -> str:

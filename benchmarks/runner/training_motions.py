@@ -29,18 +29,9 @@ def plan_training_motions(garment: str, options: argparse.Namespace) -> Plan:
 
 
 def write_training_motions(garment: str, plan: Plan, out: Path) -> list[str]:
-    """Simulate what the folder `out`.parts lacks, write the file and remove the folder.
+    """Simulate what the folder `out`.parts lacks, write the file and remove the folder; return the motions.
 
-    Args:
-        garment: name of the garment.
-        plan: of `plan_training_motions`.
-        out: the file.
-
-    Returns:
-        Names of the motions that were written.
-
-    Raises:
-        StudyError: a simulation failed, or did not reach its last frame.
+    Raises StudyError where a simulation failed, or did not reach its last frame.
     """
     run, assets = RunFolder(out.with_name(f"{out.name}.parts")), plan.open_assets()
     schedule, network = Schedule(plan), Network(LEARNER, 0, garment)

@@ -211,7 +211,8 @@ def together(folder: Path, *batches: list[Task]) -> dict[str, Outcome]:
 
 
 def test_a_batch_stays_together_and_nothing_is_kept_between_batches(tmp_path):
-    batch = [task("one"), task("two"), task("bad", "raise"), task("four")]
+    hows = {"one": "", "two": "", "bad": "raise", "four": ""}
+    batch = [task(name, how, batch="first") for name, how in hows.items()]
     outcomes = together(tmp_path, batch, [task("three")])
     memos = {name: outcome.result.get("memo") for name, outcome in outcomes.items()}
     assert memos == {
