@@ -17,7 +17,6 @@ import numpy as np
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.results import protocol as recorded
 from benchmarks.results.protocol import LEAST_MEMBERS, MEMBERS
-from benchmarks.scene import Scene
 from benchmarks.scenes import GARMENT_SCENES, SCENES, all_scenes
 from reference_sim.minimise.newton import Newton
 
@@ -34,11 +33,6 @@ PATH = (0.0, 0.3, 1.0, 1.6)  # share of the fall in each frame of the probe: it 
 OUTSIDE = ("name", "description", "module", "declared_in", "files", "self_contact")
 
 
-def definitions() -> dict[str, Any]:
-    """Return part of the protocol -> what it defines, as values that `digest` takes."""
-    return {part: make() for part, make in PARTS.items()}
-
-
 def _scenes() -> dict[str, Any]:
     """Return declarations of all scenes, body and T-shirt, and what small scenes are built of."""
     from snug.body.parametric_body import Body
@@ -51,7 +45,10 @@ def _scenes() -> dict[str, Any]:
     declared = all_scenes((*TEST, *VALIDATION), (*DYNAMIC_TEST, *DYNAMIC_VALIDATION))
     built = {scene.name: scene.at(preset).build() for scene in SCENES}
     return {
-        "declared": {name: _declared(scene) for name, scene in declared.items()},
+        "declared": {
+            name: {field: value for field, value in vars(scene).items() if field not in OUTSIDE}
+            for name, scene in declared.items()
+        },
         "worn": settings_of(body, find_template("tshirt").tailor(body, vertices=preset.garment_vertices)),
         "garments": {worn.garment: _defaults(find_template(worn.garment)) for worn in GARMENT_SCENES},
         "built": {
@@ -69,10 +66,6 @@ def _defaults(template: GarmentTemplate) -> dict[str, Any]:
     """Return the number of vertices and the measures of a garment that is tailored without any given."""
     vertices = inspect.signature(template.tailor).parameters["vertices"].default
     return {"vertices": vertices, **template.measures}
-
-
-def _declared(scene: Scene) -> dict[str, Any]:
-    return {name: value for name, value in vars(scene).items() if name not in OUTSIDE}
 
 
 def _rounded(array: np.ndarray) -> np.ndarray:
@@ -161,6 +154,7 @@ def _statistics() -> dict[str, Any]:
     }  # fmt: skip
 
 
+# Part of the protocol -> what it defines, as values that `digest` takes.
 PARTS: dict[str, Callable[[], dict[str, Any]]] = {
     "scenes": _scenes,
     "materials": _materials,

@@ -19,7 +19,7 @@ from tests.benchmarks.plan.planned import study_with
 
 @pytest.fixture(scope="module")
 def parts():
-    return protocol.definitions()
+    return {part: make() for part, make in protocol.PARTS.items()}
 
 
 def test_the_recorded_digests_are_those_of_the_code(parts):

@@ -36,12 +36,7 @@ def write(root: Path, path: str, text: str) -> None:
     """Write a file anew."""
     (root / path).parent.mkdir(parents=True, exist_ok=True)
     (root / path).write_text(text)
-    forget()
-
-
-def forget() -> None:
-    """Let nothing be known of files that were read."""
-    provenance._content.cache_clear()
+    provenance._content.cache_clear()  # of files that were read
 
 
 @pytest.mark.parametrize("path", [*FILES, "snug/another.py"])

@@ -5,10 +5,12 @@ from __future__ import annotations
 import os
 import random
 import signal
-import subprocess
 import sys
 import time
 from contextlib import nullcontext, suppress
+from multiprocessing import get_context
+from multiprocessing.context import SpawnProcess
+from pathlib import Path
 
 import pytest
 
@@ -21,18 +23,7 @@ from benchmarks.runner import execute_plan as execution
 from benchmarks.runner.task import RunRefused, RunStopped
 from snug.networks.tensor_file import read_tensors
 from tests.benchmarks.plan.planned import study_with
-from tests.benchmarks.runner.cluster_by_hand import (
-    Dask,
-    alive,
-    cluster,
-    files,
-    finish,
-    lines,
-    start_runner,
-    together,
-    until,
-    write,
-)
+from tests.benchmarks.runner.processes_by_hand import Dask, alive, chain, finish, task, together, until
 
 pytest.importorskip("distributed")
 KILLS = int(os.environ.get("KILLS", "10"))  # of the processes here, and as many of the cluster
@@ -41,7 +32,7 @@ KILLS = int(os.environ.get("KILLS", "10"))  # of the processes here, and as many
 @pytest.fixture(scope="module")
 def two(tmp_path_factory):
     """A scheduler and two workers, for all tests that kill neither."""
-    with cluster(tmp_path_factory.mktemp("cluster"), 2) as started:
+    with Dask(tmp_path_factory.mktemp("cluster"), 2) as started:
         yield started
 
 
@@ -49,8 +40,13 @@ def two(tmp_path_factory):
 def expected(tmp_path_factory) -> dict[str, str]:
     """The files of all tasks, done by processes here."""
     folder = tmp_path_factory.mktemp("expected")
-    finish(folder)
+    finish(folder, *chain())
     return files(folder)
+
+
+def files(folder: Path) -> dict[str, str]:
+    """Name -> text, of what is whole and of what is not."""
+    return {path.name: path.read_text() for path in sorted(folder.rglob("*.txt"))}
 
 
 # --- what comes back ---------------------------------------------------------------------------------------
@@ -58,11 +54,12 @@ def expected(tmp_path_factory) -> dict[str, str]:
 
 @pytest.mark.slow
 def test_a_cluster_leaves_the_same_files_as_processes_here(two, folder, expected):
-    runner = finish(folder.path, two.address)
+    options = {"address": two.address, "origin": {"commit": "c", "hardware": "h"}}
+    runner = finish(folder.path, *chain(), **options)
     assert len(expected) == 12 and files(folder.path) == expected
     origins = [outcome.origin for outcome in runner.outcomes.values()]
     assert {o["commit"] for o in origins} == {"c"} and "h" not in {o["hardware"] for o in origins}
-    assert len(finish(folder.path, two.address).reused) == 12
+    assert len(finish(folder.path, *chain(), **options).reused) == 12
 
 
 @pytest.mark.slow
@@ -83,7 +80,7 @@ def test_a_run_on_a_cluster_is_that_of_this_machine(tmp_path, monkeypatch):
             {name: tensor.numpy().tobytes() for name, tensor in weights.items()},
         )
 
-    with cluster(tmp_path, 2) as started:
+    with Dask(tmp_path, 2) as started:
         assert kept("there", "--scheduler", started.address) == kept("here")
 
 
@@ -97,7 +94,7 @@ def test_a_worker_of_other_software_or_without_the_folder_ends_the_run_in_one_li
         patch.setattr(scheduler, "software_of", lambda task: software_of(task) | {"package numpy": "1.0"})
         other = r"^worker tcp:.*\(package numpy\); install the same there as here"
         with pytest.raises(RunStopped, match=other):
-            together(folder, two.address, [write("one")])
+            together(folder.path, [task("one")], address=two.address)
     do = scheduler.Cluster.do
 
     def without_folder(self, *arguments):
@@ -106,7 +103,7 @@ def test_a_worker_of_other_software_or_without_the_folder_ends_the_run_in_one_li
 
     monkeypatch.setattr(scheduler.Cluster, "do", without_folder)
     with pytest.raises(RunStopped, match=r"worker tcp:.*does not see the run's folder .*--out"):
-        together(folder, two.address, [write("one")])
+        together(folder.path, [task("one")], address=two.address)
     assert list(folder.path.iterdir()) == []
 
 
@@ -131,10 +128,10 @@ def test_what_a_cluster_cannot_do_is_refused(field, value, tmp_path, monkeypatch
 
 @pytest.mark.slow
 def test_a_task_that_three_workers_died_of_has_failed_and_the_others_go_on(folder, tmp_path):
-    with cluster(tmp_path, 0) as dask_cluster:
-        dask_cluster.add("--nanny")  # which starts a worker again
-        batch = [write("deadly", how="die with the worker"), write("after")]
-        outcomes = together(folder, dask_cluster.address, batch, [write("bad", how="raise")])
+    with Dask(tmp_path, 0) as started:
+        started.add("--nanny")  # which starts a worker again
+        batch = [task("deadly", "die with the worker", batch="b"), task("after", batch="b")]
+        outcomes = together(folder.path, batch, [task("bad", "raise")], address=started.address)
     assert outcomes["deadly"].failed and "workers died while they did it" in outcomes["deadly"].reason
     assert outcomes["after"].status == "ok" and outcomes["bad"].reason == "ValueError: broken on purpose"
 
@@ -143,44 +140,48 @@ def test_a_task_that_three_workers_died_of_has_failed_and_the_others_go_on(folde
 @pytest.mark.parametrize("workers", [0, 2])
 def test_killed_at_random_moments_the_files_are_the_same(folder, tmp_path, expected, workers):
     """The runner, a worker, the scheduler; here a task's process. What was finished is not done again."""
-    chance, kills, mark = random.Random(7), 0, tmp_path / "mark"
-    with cluster(tmp_path, workers) if workers else nullcontext() as dask_cluster:
-        address = dask_cluster.address if dask_cluster else ""
+    chance, kills, begun = random.Random(7), 0, tmp_path / "begun"
+    begun.touch()
+    with Dask(tmp_path, workers) if workers else nullcontext() as cluster:
+        options = {"address": cluster.address if cluster else "", "workers": 2, "retry": True}
         while kills < KILLS:
-            runner = start_runner(folder.path, address, seconds=0.3, mark=mark)
-            while kills < KILLS and runner.poll() is None:
-                begun = len(lines(mark))
-                until(lambda: len(lines(mark)) > begun or runner.poll() is not None)  # noqa: B023
+            runner = get_context("spawn").Process(
+                target=finish, args=(folder.path, *chain(sleep=0.3)), kwargs=options
+            )
+            runner.start()
+            while kills < KILLS and runner.is_alive():
+                before = begun.read_text()
+                until(lambda: begun.read_text() != before or not runner.is_alive())  # noqa: B023
                 time.sleep(chance.uniform(0.0, 0.6))
-                if runner.poll() is not None:
+                if not runner.is_alive():
                     break
                 kept = {path: path.read_bytes() for path in folder.path.glob("cache/**/*.json")}
-                kill_one(chance, dask_cluster, runner, lines(mark)[-1][1])
+                kill_one(chance, cluster, runner, int(begun.read_text().split()[-1]))
                 kills += 1
                 assert {path: path.read_bytes() for path in kept} == kept
-            runner.wait(120)
+            runner.join(120)
             if files(folder.path) == expected:  # begin again: there are kills left
                 for path in folder.path.rglob("*.json"):
                     path.unlink()
-        finish(folder.path, address)
+        finish(folder.path, *chain(), **options)
     assert files(folder.path) == expected
-    until(lambda: not any(alive(task) for _, task in lines(mark)), 15.0)
+    until(lambda: not any(alive(int(pid)) for pid in begun.read_text().split()[1::2]), 15.0)
 
 
-def kill_one(chance: random.Random, dask_cluster: Dask | None, runner: subprocess.Popen, task: int) -> None:
+def kill_one(chance: random.Random, cluster: Dask | None, runner: SpawnProcess, pid: int) -> None:
     victim = chance.choice(("runner", "worker", "worker", "scheduler"))
     if victim == "runner":
         runner.kill()
-        runner.wait()
-    elif dask_cluster is None:
+        runner.join()
+    elif cluster is None:
         with suppress(ProcessLookupError):  # it has just ended with the chain
-            os.kill(task, signal.SIGKILL)
+            os.kill(pid, signal.SIGKILL)
     elif victim == "worker":
-        worker = dask_cluster.workers.pop(chance.randrange(len(dask_cluster.workers)))
+        worker = cluster.workers.pop(chance.randrange(len(cluster.workers)))
         worker.kill()
         worker.wait()
-        dask_cluster.add()
+        cluster.add()
     else:
-        dask_cluster.restart_scheduler()
-        dask_cluster.add()
-        dask_cluster.add()
+        cluster.restart_scheduler()
+        cluster.add()
+        cluster.add()

@@ -107,6 +107,9 @@ def test_inputs_are_added_to_a_methods_own_work_and_percentiles_are_medians_of_r
     costs, remark = clock_costs(cell, 3, outcomes)
     assert costs["cost/frame"] == pytest.approx(275.0) and costs["cost/whole"] == pytest.approx(277.0)
     assert costs["cost/frame_p95"] == pytest.approx(400.0) and remark == ""
+    outcomes["repeat", f"{cell.name}-2"] = Outcome("failed", "more than one thread", result={"seconds": 9.0})
+    costs, remark = clock_costs(cell, 3, outcomes)
+    assert costs["cost/frame"] == pytest.approx(275.0) and remark == "repeat 2: failed: more than one thread"
 
 
 def test_an_extreme_case_may_fail_honestly_and_nothing_else_may():

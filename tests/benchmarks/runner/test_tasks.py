@@ -2,75 +2,15 @@
 
 from __future__ import annotations
 
-import os
-import signal
-import subprocess
-import sys
-from functools import partial
-from pathlib import Path
-
-import numpy as np
 import pytest
 
-from benchmarks.method import WorkerDied
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.executor import Executor, TaskProcess
 from benchmarks.runner.loop import Runner
-from benchmarks.runner.task import Context, Outcome, Task
-from tests.benchmarks.runner.cluster_by_hand import alive, until
+from benchmarks.runner.task import Task
+from tests.benchmarks.runner.processes_by_hand import alive, finish, ids, task, together, until
 from tests.benchmarks.runner.tasks_by_hand import InProcess
-
-
-def fail(how: str) -> None:
-    """Let the process that does a task go wrong."""
-    if how == "raise":
-        raise ValueError("broken on\npurpose")
-    if how == "die":
-        os.kill(os.getpid(), signal.SIGKILL)
-    if how == "hang":
-        signal.pause()
-    if how == "torch":
-        raise RuntimeError("DefaultCPUAllocator: can't allocate memory")
-    if how == "leave":
-        child = subprocess.Popen([sys.executable, "-c", "import time; time.sleep(60)"])
-        raise WorkerDied(str(child.pid), "timeout")
-    if how == "interrupt":
-        raise KeyboardInterrupt
-
-
-def write(name: str, how: str, context: Context, needed) -> Outcome:
-    """Write a file of the words of what is needed, unless `how` says what to do instead."""
-    fail(how)
-    context.memo.setdefault("done", []).append(name)
-    path = context.folder.path / f"{name}.txt"
-    path.write_text("".join(outcome.result["word"] for outcome in needed.values()) or "first")
-    result = {"word": name, "memo": list(context.memo["done"])}
-    files = ("nowhere.txt",) if how == "nowhere" else (path.name,)
-    return Outcome(result=result | ({"x": np.float32(1)} if how == "float32" else {}), files=files)
-
-
-def no_room() -> None:
-    raise MemoryError("no room to compile")
-
-
-def task(name: str, how: str = "", **ties) -> Task:
-    """A task, by default without a row; how: what goes wrong, which is no part of what it is known by."""
-    return Task(
-        kind="network", name=name, label=name, stage="writing", run=partial(write, name, how), silent=True,
-        inputs={"value": 0}, code=("benchmarks/results",), warm_up=no_room if how == "cold" else None,
-        deadline=0.5 if how == "hang" else None, **ties,
-    )  # fmt: skip
-
-
-def ids(*names: str) -> tuple[tuple[str, str], ...]:
-    return tuple(("network", name) for name in names)
-
-
-def finish(folder: Path, *tasks: Task, **options) -> Runner:
-    runner = Runner(tasks, Cache(RunFolder(folder), **options))
-    runner.run(Executor(RunFolder(folder), None, 1))
-    return runner
 
 
 def statuses(runner: Runner) -> dict[str, str]:
@@ -106,7 +46,7 @@ def test_a_failure_is_kept_blocks_what_needs_it_and_is_done_again_when_asked(
     bad, needs = (first.outcomes["network", name] for name in ("bad", "needs"))
     assert bad.failed and words in bad.reason and "\n" not in bad.reason
     assert needs.reason == f"cannot be run: network bad: {status}: {bad.reason}"
-    assert (tmp_path / "reads.txt").read_text() == "first"
+    assert (tmp_path / "reads.txt").read_text() == "reads"
     assert first.broken() == [f"network bad: {bad.ending}", f"network needs: {needs.ending}"]
 
     second = finish(tmp_path, *tasks())  # it would succeed now
@@ -115,7 +55,7 @@ def test_a_failure_is_kept_blocks_what_needs_it_and_is_done_again_when_asked(
 
     third = finish(tmp_path, *tasks(), retry=True)
     assert set(statuses(third).values()) == {"ok"} and third.reused == ["network other"]
-    assert (tmp_path / "needs.txt").read_text() == (tmp_path / "reads.txt").read_text() == "bad"
+    assert [(tmp_path / f"{name}.txt").read_text() for name in ("needs", "reads")] == ["badneeds", "badreads"]
 
 
 def test_a_dry_run_decides_as_the_run_does(tmp_path):
@@ -177,8 +117,8 @@ class TwoAtOnce(InProcess):
                 return
             self.at_work.append([task.name for tasks, _ in begun for task in tasks])
             tasks, needed = begun.pop(0)
-            for task in tasks:
-                yield task, task.run(self.context(), needed)
+            for each in tasks:
+                yield each, each.run(self.context(), needed)
 
     def alone(self, task, needed):
         self.at_work.append([task.name])
@@ -202,12 +142,6 @@ def test_a_task_begins_when_its_needs_are_there_and_nothing_is_beside_a_timed_ta
 
 
 # --- processes ---------------------------------------------------------------------------------------------
-
-
-def together(folder: Path, *batches: list[Task]) -> dict[str, Outcome]:
-    left = [(batch, {}) for batch in reversed(batches)]
-    done = Executor(RunFolder(folder), None, 1).together(lambda: left.pop() if left else None)
-    return {task.name: outcome for task, outcome in done}
 
 
 def test_a_batch_stays_together_and_nothing_is_kept_between_batches(tmp_path):
