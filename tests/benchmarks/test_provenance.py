@@ -36,7 +36,12 @@ def write(root: Path, path: str, text: str) -> None:
     """Write a file anew."""
     (root / path).parent.mkdir(parents=True, exist_ok=True)
     (root / path).write_text(text)
-    provenance._content.cache_clear()  # of files that were read
+    forget()
+
+
+def forget() -> None:
+    """Let nothing be known of files that were read."""
+    provenance._content.cache_clear()
 
 
 @pytest.mark.parametrize("path", [*FILES, "snug/another.py"])
