@@ -20,7 +20,6 @@ from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.loop import Runner
-from snug.trained import FOLDER
 
 if TYPE_CHECKING:
     from benchmarks.assets import Assets
@@ -51,7 +50,6 @@ class RunLog:
             "study": dict(plan.study),
             "preset": plan.preset.name,
             "protocol": {"number": NUMBER, "digest": DIGEST},
-            "suites": list(plan.suites),
             "motions": {
                 f"{role} {garment}": list(names)
                 for garment in plan.garments
@@ -64,8 +62,6 @@ class RunLog:
             "seeds": list(plan.seeds),
             "clock": {"name": "time.perf_counter", "threads": 1, "cells_at_a_time": 1},
             "workers": plan.workers,
-            "scheduler": plan.scheduler or None,
-            "pretrained": "of the package" if plan.trained == FOLDER else plan.trained and plan.trained.name,
             "commit": self.origin["commit"],
             "started": now(),
             "finished": None,
@@ -104,17 +100,11 @@ class RunLog:
         with self.stage("body, garments and motions"):
             assets = made or self.plan.open_assets()
         self.config["garments"] = {
-            garment.name: {
-                "vertices": len(garment.rest_positions),
-                "triangles": len(garment.faces),
-                "parameters": {name: float(value) for name, value in garment.parameters.items()},
-                "material": dataclasses.asdict(garment.material),
-            }
-            for garment in assets.garments.values()
+            name: {"vertices": len(g.rest_positions), "material": dataclasses.asdict(g.material)}
+            for name, g in assets.garments.items()
         }
-        motions = assets.motions
-        self.config["motions"]["frames"] = {name: motion.frames for name, motion in motions.items()}
-        self.note("motion_sources", {name: motion.source for name, motion in motions.items()})
+        self.config["motions"]["frames"] = {name: motion.frames for name, motion in assets.motions.items()}
+        self.note("motion_sources", {name: motion.source for name, motion in assets.motions.items()})
         return assets
 
     def note_outcomes(self, runner: Runner) -> None:
@@ -159,20 +149,17 @@ def now() -> str:
 
 
 def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
-    """Return what run.json says of the metrics, methods, scenes and cases of these rows.
-
-    A report needs no other source.
-    """
+    """Return what run.json says of metrics, methods, scenes and cases that is not in their rows."""
     methods = {cell.method: cell.entry for cell in plan.cells}
     order = {name: place for place, name in enumerate(declared(plan.metrics))}
     names = dict.fromkeys(row.metric for row in rows if row.method in methods)
     metrics = {}
     for name in sorted(names, key=lambda name: order.get(name, len(order))):
         with suppress(KeyError):  # of a case, which describes its rows itself
-            metrics[name] = _fields(find_metric(name, plan.metrics), "name", "declared_in")
-    without = ("name", "module", "declared_in", "files", "sizes", "options", "metrics")
+            fields = vars(find_metric(name, plan.metrics))
+            metrics[name] = {field: fields[field] for field in fields if field not in ("name", "declared_in")}
     scenes = {
-        scene.name: _fields(scene, *without) | {"role": plan.motions.role_of(scene.motion)}
+        scene.name: {"description": scene.description, "role": plan.motions.role_of(scene.motion)}
         for scene in plan.scenes
     }
     remarks = {row.method: "declared time" for row in rows if row.declared}
@@ -180,22 +167,14 @@ def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
     of_methods = {
         name: {
             "label": f"{entry.label or name} ({remarks[name]})" if name in remarks else entry.label,
-            "description": entry.description, "role": entry.role, "family": entry.reporting.family,
-            "level": entry.reporting.level, "base": entry.reporting.base, "seeded": entry.seeded,
-            "dtype": entry.dtype,
+            "description": entry.description,
         }
         for name, entry in methods.items()
-    }  # fmt: skip
+    }
     cases = {
         case.name: {
-            "description": case.description, "suite": case.suite, "scene": case.scene or case.name,
-            "metric": case.metric,
+            "description": case.description, "scene": case.scene or case.name, "metric": case.metric,
         }
         for case in plan.cases
     }  # fmt: skip
     return {"metrics": metrics, "methods": of_methods, "scenes": scenes, "cases": cases}
-
-
-def _fields(entry: Any, *without: str) -> dict[str, Any]:
-    names = [field.name for field in dataclasses.fields(entry) if field.name not in without]
-    return {name: getattr(entry, name) for name in names}
