@@ -25,7 +25,7 @@ from benchmarks.presets import find_preset
 from benchmarks.provenance import digest
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
-from benchmarks.runner.cells import compute_cell, scene_of
+from benchmarks.runner.cells import build_scene, compute_cell
 from benchmarks.runner.executor import Executor
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.schedule import tasks_of
@@ -149,7 +149,8 @@ def run_checked(cell: Cell, least: float, context: Context, needed: Needed) -> O
             check_scene(cell.scene, context.assets)
         outcome = compute_cell(cell, least, context)
         if entry.declared_in and not outcome.failed:
-            check_method(entry, scene_of(cell, context), partial(entry.make, models=models), cell.seed)
+            scene = build_scene(cell.scene, context)
+            check_method(entry, scene, partial(entry.make, models=models), cell.seed)
     except (ContractError, RunStopped):
         raise
     except Exception as error:

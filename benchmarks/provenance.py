@@ -15,7 +15,6 @@ import json
 import os
 import platform
 import subprocess
-from collections.abc import Mapping
 from contextlib import suppress
 from functools import cache
 from importlib import metadata
@@ -129,17 +128,6 @@ def digest_of_file(path: Path) -> str:
     """Return 16 hexadecimal digits of a file's bytes. Raises OSError."""
     with path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()[:16]
-
-
-def damaged(folder: Path, digests: Mapping[str, str]) -> str:
-    """Return which file of a folder, name -> digest, is gone or altered; empty where none is."""
-    for name, content in digests.items():
-        path = folder / name
-        if not path.is_file():
-            return f"{name} is gone"
-        if digest_of_file(path) != content:
-            return f"{name} is damaged"
-    return ""
 
 
 # Prose, compiled kernels; and trained networks: a task that reads one names its digest.

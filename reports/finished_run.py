@@ -272,7 +272,8 @@ def read_run(folder: RunFolder) -> Run:
     config, rows = folder.read_config(), folder.read_rows()
     if not rows:
         raise ResultsError(f"{folder.rows_path}: holds no rows; nothing to report")
-    run = make_run(config, rows, folder.changed(config))
+    changed = folder.changed(config.get("digests") or {})
+    run = make_run(config, rows, [name for name, how in changed.items() if how == "damaged"])
     return replace(
         run,
         protocol=one_protocol(run.frame["protocol"], folder.rows_path),

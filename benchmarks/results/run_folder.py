@@ -6,7 +6,7 @@ import csv
 import json
 import math
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -30,18 +30,9 @@ def model_path(models: Path, kind: str, seed: int) -> Path:
 
 
 class RunFolder:
-    """The files of one run under `path`. Making the object creates nothing.
+    """The files of one run under `path`, and folders of its report, networks, trajectories and outcomes.
 
-    Attributes:
-        path: the folder.
-        config_path: run.json, the configuration.
-        rows_path: results.csv, one measured number a line.
-        frame_energies_path: frame_energies.csv.
-        report_path: the report as a PDF; page_path: as an interactive page.
-        tables, figures: folders of the report.
-        models: folder of trained networks.
-        trajectories: folder of trajectories, and of arrays beside them.
-        cache: folder of the outcomes of tasks.
+    Making the object creates nothing.
     """
 
     def __init__(self, path: str | os.PathLike[str]) -> None:
@@ -106,11 +97,12 @@ class RunFolder:
             raise ResultsError(f"{self.config_path}: {OLD}")
         return config
 
-    def changed(self, config: dict[str, Any]) -> list[str]:
-        """Return the files of the run that are not as it wrote them; those that are gone are not named."""
-        digests = config.get("digests") or {}
-        there = [name for name in digests if (self.path / name).is_file()]
-        return [name for name in there if digest_of_file(self.path / name) != digests[name]]
+    def changed(self, digests: Mapping[str, str]) -> dict[str, str]:
+        """Return those of these files that are not as the run wrote them: name -> gone or damaged."""
+        paths = {name: self.path / name for name in digests}
+        gone = {name: "gone" for name, path in paths.items() if not path.is_file()}
+        there = {name: digest_of_file(path) for name, path in paths.items() if name not in gone}
+        return gone | {name: "damaged" for name, now in there.items() if now != digests[name]}
 
     def write_rows(self, rows: Iterable[Row]) -> None:
         """Write results.csv whole or not at all."""

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.plan.cell import TaskId
-from benchmarks.provenance import damaged, digest, digest_of_file, software
+from benchmarks.provenance import digest, digest_of_file, software
 from benchmarks.results.row import ResultsError, read_json
 from benchmarks.results.run_folder import FORMAT, RunFolder
 from benchmarks.runner.task import Outcome, Task
@@ -58,8 +58,8 @@ class Cache:
             entry = read_json(path)
         if (entry.get("format"), entry.get("task")) != (FORMAT, task.title):
             return Cached("missing: its entry is damaged or of another version")
-        if damage := damaged(self.folder.path, entry["files"]):
-            return Cached(f"missing: {damage}")
+        if lost := self.folder.changed(entry["files"]):
+            return Cached("missing: " + ", ".join(f"{name} is {how}" for name, how in lost.items()))
         now, before = dependencies(task, others), entry["parts"]
         if changed := [name for name in now | before if now.get(name) != before.get(name)]:
             return Cached("stale: " + ", ".join(changed[:3]) + (", ..." if len(changed) > 3 else ""))

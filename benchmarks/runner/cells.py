@@ -29,17 +29,10 @@ INPUTS = 0.1  # of the time measured of a run, for its inputs: a few equal milli
 UNBELIEVABLE = "its time cannot be believed: "
 
 
-def scene_of(cell: Cell, context: Context) -> BuiltScene:
-    """Return the scene of a cell, built once in a process."""
-    if "scene" not in context.memo:
-        context.memo["scene"] = build_scene(cell.scene, context)
-    return context.memo["scene"]
-
-
 def prepared_method(cell: Cell, context: Context) -> Method:
     """Return a method that is prepared and has not run."""
     method = cell.entry.make(models=context.folder.models_of(cell.scene.garment), seed=cell.seed)
-    method.prepare(scene_of(cell, context))
+    method.prepare(build_scene(cell.scene, context))
     return method
 
 
@@ -88,7 +81,7 @@ def files_of(cell: Cell, folder: RunFolder) -> tuple[str, ...]:
 def compute_cell(cell: Cell, least: float, context: Context) -> Outcome:
     """Prepare off the clock, run on it, write the trajectory; memory is that until the run has ended."""
     folder = context.folder
-    scene, method = scene_of(cell, context), prepared_method(cell, context)
+    scene, method = build_scene(cell.scene, context), prepared_method(cell, context)
     if cell.timed:
         trajectory, reading, frames = timed(method, 0.0)
     else:
@@ -149,16 +142,20 @@ def repeat_cell(longest: float, cell: Cell, least: float, context: Context, need
 
 
 def build_scene(scene: Scene, context: Context) -> BuiltScene:
-    """Return the built scene, a dressed one with the start and the posed body of the run's folder."""
+    """Return the scene, built once for a batch; a dressed one with start and body of the run's folder."""
     run, assets = context.folder, context.assets
-    if assets is None or not run.body_path(scene.name).is_file():
-        return scene.build(assets)
-    import numpy as np
+    if "scene" in context.memo:
+        return context.memo["scene"]
+    if assets and run.body_path(scene.name).is_file():
+        import numpy as np
 
-    bodies = {assets.motion(scene.motion, scene.part).name: np.load(run.body_path(scene.name))}
-    start = np.load(run.start_path(scene.name))
-    dressed = scene.build(replace(assets, bodies=bodies))
-    return replace(dressed, settle=lambda: start)
+        bodies = {assets.motion(scene.motion, scene.part).name: np.load(run.body_path(scene.name))}
+        start = np.load(run.start_path(scene.name))
+        built = replace(scene.build(replace(assets, bodies=bodies)), settle=lambda: start)
+    else:
+        built = scene.build(assets)
+    context.memo["scene"] = built
+    return built
 
 
 def clocked_inputs(method: Method, scene: BuiltScene, *, least: float) -> Reading:

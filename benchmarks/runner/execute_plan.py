@@ -6,10 +6,10 @@ import fcntl
 import os
 import sys
 from collections import Counter
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from benchmarks.external.roll_out_files import MODULE, RollOutFileError
 from benchmarks.plan.plan import Plan, runs
@@ -30,17 +30,13 @@ if TYPE_CHECKING:
 MOST_FAILURES = 8  # that the end of a run names; its files have all
 
 
-def summary(rows: Sequence[Row], stages: Iterable[dict[str, Any]]) -> str:
-    """Return one line of counts and times."""
+def summary(rows: Sequence[Row]) -> str:
+    """Return one line of how many rows of each suite have which status."""
     last = []
     for suite in dict.fromkeys(row.suite for row in rows):
         statuses = Counter(row.status for row in rows if row.suite == suite)
         last.append(f"{suite}: " + ", ".join(f"{count} {status}" for status, count in statuses.items()))
-    times: Counter[str] = Counter()
-    for stage in stages:
-        times[stage["name"]] += stage["seconds"]
-    longest = ", ".join(f"{name} {seconds:.0f} s" for name, seconds in times.most_common(3))
-    return "; ".join([*last, f"time: {times.total():.0f} s ({longest})"])
+    return "; ".join(last)
 
 
 def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) -> int:
@@ -68,7 +64,7 @@ def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) ->
     log.note_outcomes(runner)
     log.note("finished", now())
     answer = make_report(log) if report else ""
-    print(*filter(None, (answer, summary(log.rows, log.stages))), sep="\n", flush=True)
+    print(*filter(None, (answer, summary(log.rows))), sep="\n", flush=True)
     failed = [row for row in log.rows if not accepted(row)]
     ends = dict.fromkeys(f"{row.scene} x {row.method}: {row.status}: {row.reason}" for row in failed)
     lines = [*ends, *runner.broken()]

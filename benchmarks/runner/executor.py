@@ -1,7 +1,4 @@
-"""Executor of tasks: untimed ones side by side, here or on a cluster; timed ones alone on this machine.
-
-A task that raises, exceeds a deadline of its own, or whose process dies is an outcome, not an end of the run.
-"""
+"""Executor of tasks: untimed ones side by side, here or on a cluster; timed ones alone on this machine."""
 
 from __future__ import annotations
 

@@ -137,12 +137,9 @@ def how_it_ended(code: int) -> tuple[str, str]:
 
     Nobody here kills a process that answers in time: a SIGKILL comes from a system that is out of memory.
     """
-    if code >= 0:
-        return f"the process ended with status {code}", "failed"
-    name = signal.Signals(-code).name
-    if name == "SIGKILL":
+    if code == -signal.SIGKILL:
         return "the process was killed by SIGKILL: the system was out of memory", "out-of-memory"
-    return f"the process was ended by {name}", "failed"
+    return f"the process ended with {f'status {code}' if code >= 0 else signal.Signals(-code).name}", "failed"
 
 
 def end_group(pid: int) -> None:

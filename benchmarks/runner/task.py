@@ -1,8 +1,4 @@
-"""A task: work that is done once and kept, with its inputs, its needs and its outcome.
-
-Ground truth, trainings, cells and their repeats, metrics, validation and stress cases are all tasks. The
-runner alone asks the cache, runs tasks in their processes, keeps outcomes and goes on after a failure.
-"""
+"""A task: work that is done once and kept, with its inputs, its needs and its outcome."""
 
 from __future__ import annotations
 

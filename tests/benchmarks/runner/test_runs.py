@@ -136,10 +136,10 @@ def test_every_kind_of_kept_file_is_made_again_and_the_numbers_are_the_same(dres
     data = bytearray((folder / name).read_bytes())
     data[len(data) // 2] ^= 16
     (folder / name).write_bytes(data)
-    assert RunFolder(folder).changed({"digests": digests}) == [name]
+    assert RunFolder(folder).changed(digests) == {name: "damaged"}
     assert run_dressed(folder) == dressed[1]
     config = RunFolder(folder).read_config()
-    assert set(config["digests"]) == set(digests) and RunFolder(folder).changed(config) == []
+    assert set(config["digests"]) == set(digests) and not RunFolder(folder).changed(config["digests"])
 
 
 # --- cases -------------------------------------------------------------------------------------------------
