@@ -13,11 +13,7 @@ from textwrap import shorten
 
 import pandas as pd
 
-from reports.figures.charts import (
-    dots,
-    energy_series,
-    error_of_page_one,
-)
+from reports.figures.charts import energy_series, error_of_page_one
 from reports.figures.plotting import Figure, Picture
 from reports.finished_run import Run
 from reports.pictures import failures, side_by_side
@@ -103,7 +99,6 @@ BLOCKS: tuple[Heading | Figure | TableBlock, ...] = (
     TableBlock("error_rivals"),
     Heading("Behind the means"),
     Figure("failures", failures),
-    Figure("dots", dots),
     Heading("Dynamics"),
     TableBlock("dynamics"),
     Figure("energy_series", energy_series),

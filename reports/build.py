@@ -11,14 +11,10 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command_line import Parser, command
-
-if TYPE_CHECKING:
-    pass
 
 
 @dataclass(frozen=True)

@@ -1,8 +1,4 @@
-"""Charts of the report: error and total cost against time, energies, dots.
-
-Relative excess takes the place of the total energy where the run has it. It spans decades and may be below
-zero, so its dots stand on the scale of its statistics, arcsinh(x / 1 %).
-"""
+"""Charts of the report: error against run time, and energies frame by frame."""
 
 from __future__ import annotations
 
@@ -14,23 +10,19 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.metric import Metric
-from benchmarks.results.protocol import SOFTENING
 from reports.figures.plotting import (
     Drawing,
     Style,
-    arcsinh_axis,
     family_style,
     file_name,
     fit,
-    leading,
     log_axis,
     new_panels,
     power_text,
     style,
-    wrapped,
 )
 from reports.finished_run import ReportedMethod, Run, shown_seeds
-from reports.statistics.means_and_spreads import Mean, means, value_of
+from reports.statistics.means_and_spreads import value_of
 from reports.statistics.outcomes import leads
 from reports.statistics.pareto import (
     ERRORS,
@@ -42,7 +34,6 @@ from reports.statistics.pareto import (
     run_time,
     time_label,
 )
-from reports.statistics.relative_excess import RELATIVE_EXCESS, TOTAL, excess_of, with_relative_excess
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -224,7 +215,7 @@ def energy_series(run: Run) -> Iterator[Drawing]:
     have = set(frames.dropna(subset=terms, how="all")["method"])
     methods = leads(run, run.frame[run.frame["method"].isin(have)])
     curves = {method: frames[frames["method"] == method] for method in methods}
-    figure, panels = new_panels(len(terms), 3)
+    figure, panels = new_panels(len(terms))
     for axes, term in zip(panels, terms):
         for method, curve in reversed(curves.items()):  # the reference last, on top
             look, energy = style(run, method), curve[term].where(curve[term] > 0.0)
@@ -249,64 +240,3 @@ def _frames(run: Run) -> tuple[str, pd.DataFrame]:
     scene = str(frames["scene"].iloc[0])
     seeds = shown_seeds(run.frame[run.frame["scene"] == scene]).loc[scene]
     return scene, frames[(frames["scene"] == scene) & (frames["seed"] == frames["method"].map(seeds))]
-
-
-METRICS = (TOTAL, "curvature/error", "penetration/vertices")
-MOST_METHODS = 24  # methods that have room below each other
-
-
-def dots(run: Run) -> Iterator[Drawing]:
-    """Draw cells behind the means of the first garment, a panel for each metric, a line for each method."""
-    rows = run.garment_rows
-    rows = rows[(rows["garment"] == run.first_garment) & rows["usable"] & rows["metric"].isin(METRICS)]
-    methods = leading(run, set(rows["method"]))[:MOST_METHODS]
-    if not run.first_garment or not methods:
-        return
-    rows = with_relative_excess(run, rows)
-    measured = set(rows[rows["method"].isin(methods)]["metric"])
-    names = [name for name in METRICS if name in measured]
-    excess = RELATIVE_EXCESS.name if RELATIVE_EXCESS.name in measured else ""
-    if excess:
-        names[0] = excess
-    by_method = means(rows, "method", "metric")
-    labels = [wrapped(run.label(method), 28) for method in methods]
-    lines = max(label.count("\n") + 1 for label in labels)
-    figure, panels = new_panels(len(names), 3, sharey=True)
-    for axes, name in zip(panels, names):
-        of_methods = [by_method.get((method, name)) for method in methods]
-        bars = [mean and mean.value for mean in of_methods]
-        if name == excess:
-            bars = [known and known.typical for known in (excess_of(run, rows, m) for m in methods)]
-        shown = _draw_panel(axes, run, methods, of_methods, bars)
-        if name == excess:
-            arcsinh_axis(axes, SOFTENING)
-        elif min(shown) > 0.0 and max(shown) > 20.0 * min(shown):
-            axes.set_xlim(min(shown) / 1.3, max(shown) * 1.3)
-            log_axis(axes, "x")
-        axes.set_xlabel((RELATIVE_EXCESS if name == excess else run.metrics[name]).heading)
-        axes.grid(False, axis="y")
-    panels[0].set_yticks(range(len(methods)), labels)
-    panels[0].set_ylim(len(methods) - 0.4, -0.6)
-    fit(figure, height=(0.04 + 0.15 * lines) * len(methods))
-    caption = f"{run.first_garment}: each motion and seed behind the means; the bar is the mean"
-    caption += ", of the relative excess its typical value." if excess else "."
-    yield Drawing(figure, "dots", caption)
-
-
-def _draw_panel(
-    axes: Axes, run: Run, methods: list[str], of_methods: list[Mean | None], bars: list[float | None]
-) -> list[float]:
-    """Draw a line of dots for each method, and its bar where it has one; return the values drawn."""
-    shown: list[float] = []
-    for place, (method, mean, bar) in enumerate(zip(methods, of_methods, bars)):
-        if mean is None:
-            continue
-        look, values = style(run, method), np.array(list(mean.cells.values()))
-        shown += values.tolist()
-        axes.plot(
-            values, np.full(len(values), place), look.marker, color=look.colour, alpha=0.55,
-            markersize=4, linestyle="none",
-        )  # fmt: skip
-        if bar is not None:
-            axes.plot([bar] * 2, [place - 0.36, place + 0.36], color="#111111", linewidth=1.4)
-    return shown

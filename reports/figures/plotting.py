@@ -160,37 +160,29 @@ def new_figure(width: float, height: float) -> Canvas:
     return figure
 
 
-def new_panels(count: int, columns: int = 1, **more: Any) -> tuple[Canvas, list[Axes]]:
-    """Make a figure as wide as the page with `count` panels, so many in a line; `fit` gives it its height."""
-    columns = min(count, columns)
-    lines = -(-count // columns)
-    figure = new_figure(PAGE_WIDTH, 4.0 * PANEL * lines)
-    panels = list(figure.subplots(lines, columns, squeeze=False, **more).flat)
-    for axes in panels[count:]:
-        axes.remove()
+def new_panels(count: int) -> tuple[Canvas, list[Axes]]:
+    """Make a figure as wide as the page with `count` panels in a row; `fit` gives it its height."""
+    figure = new_figure(PAGE_WIDTH, 4.0 * PANEL)
+    panels = list(figure.subplots(1, count, squeeze=False).flat)
     for axes in panels:
-        grid(axes)
-    return figure, panels[:count]
+        axes.grid(True, color=GRID, linewidth=0.6)
+    return figure, panels
 
 
-def fit(
-    figure: Canvas, entries: Sequence[Style] = (), height: float = PANEL, *, markers: bool = False
-) -> None:
-    """Draw a legend above the panels, and give the figure the height at which each is so high [inches].
+def fit(figure: Canvas, entries: Sequence[Style], *, markers: bool = False) -> None:
+    """Draw a legend above the panels, and give the figure the height at which each is PANEL high.
 
     Call it when all that takes room is drawn; panels stay where they are from then on.
     """
-    if entries:
-        entries = entries if markers else [replace(look, marker="") for look in entries]
-        widest = _legend(figure, entries, 1)
-        width = widest.get_window_extent().width
-        widest.remove()
-        _legend(figure, entries, max(1, int(figure.bbox.width / width)))
-    lines = figure.axes[0].get_subplotspec().get_gridspec().nrows  # type: ignore[union-attr]
+    entries = entries if markers else [replace(look, marker="") for look in entries]
+    widest = _legend(figure, entries, 1)
+    width = widest.get_window_extent().width
+    widest.remove()
+    _legend(figure, entries, max(1, int(figure.bbox.width / width)))
     for _ in range(2):  # numbers beside an axis depend on its height
         figure.draw_without_rendering()
         lowest = min(axes.get_window_extent().height for axes in figure.axes) / figure.dpi
-        figure.set_figheight(figure.get_figheight() + lines * (max(height, PANEL) - lowest))
+        figure.set_figheight(figure.get_figheight() + (PANEL - lowest))
     figure.draw_without_rendering()
 
 
@@ -211,15 +203,6 @@ def log_axis(axes: Axes, which: str) -> None:
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 1.7 else (1.0,), numticks=7))
     axis.set_major_formatter(FuncFormatter(lambda value, _: power_text(value)))
     axis.set_minor_formatter(NullFormatter())
-
-
-def arcsinh_axis(axes: Axes, softening: float) -> None:
-    """Make the x axis logarithmic on both sides of 0, and linear below `softening`."""
-    from matplotlib.ticker import AsinhLocator, FuncFormatter
-
-    axes.set_xscale("asinh", linear_width=softening)
-    axes.xaxis.set_major_locator(AsinhLocator(softening, numticks=5))
-    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: power_text(value)))
 
 
 def power_text(value: float) -> str:
@@ -252,11 +235,6 @@ def _letters() -> frozenset[str]:
     from matplotlib.font_manager import findfont, get_font
 
     return frozenset(map(chr, get_font(findfont("DejaVu Sans Mono")).get_charmap()))
-
-
-def grid(axes: Axes, which: str = "both") -> None:
-    """Draw pale lines behind the data."""
-    axes.grid(True, axis=which, color=GRID, linewidth=0.6)  # type: ignore[arg-type]
 
 
 def file_name(text: str) -> str:

@@ -32,7 +32,7 @@ from tests.reports.report_folder import (
     write_mesh,
 )
 
-OLD = ("energy_series_flag.svg", "dots_tunic.svg")
+OLD = ("energy_series_flag.svg", "failures_tunic.svg")
 KEPT = ("mine.png", "map.txt", "gap-relative_against_cost-frame.svg")
 
 
@@ -78,7 +78,7 @@ def test_every_file_of_the_report_is_there(made):
     wanted = ("energies", "curvature", "cost", "validation", "extremes", "unfinished")
     assert {f"{name}.csv" for name in wanted} <= names
     pictures = {path.name for path in made.figures.iterdir()}
-    for stem in ("energy_series_tshirt-walk", "error_against_time", "dots"):
+    for stem in ("energy_series_tshirt-walk", "error_against_time"):
         assert {f"{stem}.svg", f"{stem}.png"} <= pictures
     assert {"frames_tshirt-walk.png", "failures.png"} <= pictures
     assert made.report_path.read_bytes().startswith(b"%PDF")
@@ -98,8 +98,8 @@ def test_pictures_of_roll_outs_that_are_gone_stay_in_the_report(made, tmp_path):
     shutil.rmtree(published.trajectories)
     build.build_report(published.path)
     pictures = draw_figures(read_run(published), published.figures, FIGURES)
-    kept = {picture.path.name: picture for name in ("frames", "dots") for picture in pictures[name]}
-    assert list(kept) == ["frames_tshirt-walk.png", "dots.svg"]
+    kept = {picture.path.name: picture for name in ("frames", "energy_series") for picture in pictures[name]}
+    assert list(kept) == ["frames_tshirt-walk.png", "energy_series_tshirt-walk.svg"]
     assert "walk: frame" in kept["frames_tshirt-walk.png"].caption
     assert b"/Subtype/Image" in published.report_path.read_bytes()
 

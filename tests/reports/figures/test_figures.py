@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from reports.figures import plotting
-from reports.figures.charts import curves_of, dots, draw_points
+from reports.figures.charts import curves_of, draw_points
 from reports.figures.plotting import new_figure
 from reports.finished_run import shown_seeds
 from reports.statistics.pareto import Point
@@ -27,19 +27,6 @@ def test_what_starts_from_a_method_has_its_colour_and_an_ablation_its_marker():
     )
     assert warm.colour == cleaned.colour == base.colour != less.colour
     assert less.marker == base.marker and warm.marker != base.marker
-
-
-def test_a_dot_stands_for_each_motion_and_seed():
-    rows = [
-        row(s, "snug", "energy/total", v, seed=k)
-        for s in ("tshirt/a", "tshirt/b")
-        for k, v in enumerate((1, 3))
-    ]
-    (drawing,) = dots(run_of(rows))
-    marks, bar = drawing.canvas.axes[0].get_lines()
-    assert sorted(marks.get_xdata()) == [1.0, 1.0, 3.0, 3.0] and list(bar.get_xdata()) == [2.0, 2.0]
-    assert drawing.canvas.axes[0].get_xlabel() == "Total [J]"
-    assert list(dots(run_of([row("flag", garment="")]))) == []
 
 
 def test_the_first_seed_that_came_to_its_end_is_shown():
