@@ -199,9 +199,11 @@ def _cloth(
     pack.indices("faces", faces)
     pack.numbers("times", cloth.times)
     pack.positions("positions", cloth.positions)
-    pack.values("curvature", mean_curvature(cloth.positions, faces))
+    curvature = curvature_series(cloth.positions, faces)
+    pack.values("curvature", np.where(curvature.area > 0.0, curvature.curvature, 0.0))  # 0 on boundaries
     if reference is not None and _comparable(cloth, reference):
-        pack.values("distance", distance(cloth.positions, reference.positions))
+        apart = cloth.positions - reference.positions[: cloth.frames]
+        pack.values("distance", MM * np.linalg.norm(apart, axis=-1))
     if depths is not None:
         pack.values("depth", depths)
     if STEP in cloth.frame_fields:
@@ -247,20 +249,6 @@ def _body(body: Trajectory) -> Pack:
 
 
 MM = 1e3
-
-
-def mean_curvature(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """Return the magnitude of the mean curvature (T,V) [1/m] of positions (T,V,3) [m]; 0 on boundaries."""
-    series = curvature_series(positions, faces)
-    return np.where(series.area > 0.0, series.curvature, 0.0)
-
-
-def distance(positions: np.ndarray, reference: np.ndarray) -> np.ndarray:
-    """Return the distance (T,V) [mm] between the same vertices of positions (T,V,3) [m] and a reference.
-
-    The reference has as many frames or more.
-    """
-    return MM * np.linalg.norm(positions - reference[: len(positions)], axis=-1)
 
 
 def depth(points: np.ndarray, skin: Obstacle, frame: int) -> np.ndarray:

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from reports.page.embedded_roll_outs import Pack, depth, distance, skin_of
+from reports.page.embedded_roll_outs import Pack, depth, skin_of
 from tests.reports.page.page_by_hand import block, unpacked
-from tests.reports.report_folder import sheet
 
 
 @pytest.mark.parametrize(
@@ -38,9 +37,7 @@ def test_values_are_off_by_less_than_a_hundredth_and_finer_where_small():
     assert np.abs(approximation - values)[small].max() <= full / 1000
 
 
-def test_distance_and_depth_have_their_known_values():
-    x, _ = sheet(0.0)
-    np.testing.assert_allclose(distance(x[:2] + np.array([0.0, 0.003, 0.004]), x), 5.0, rtol=1e-9)
+def test_the_depth_below_the_skin_is_known():
     corners, box = block()
     points = np.array([[0.5, 0.5, 0.98], [0.5, 0.5, 1.02], [0.01, 0.3, 0.4]])
     skin = skin_of(np.stack([corners + 1.0, corners]), box)
