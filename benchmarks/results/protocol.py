@@ -39,12 +39,7 @@ DRAWS, SEED = 10_000, 20220619  # of the bootstrap; the same draws for every com
 def one_protocol(protocols: Iterable[str], where: object) -> str:
     """Return the protocol of rows that may stand in one table; empty where all are a user's own.
 
-    Args:
-        protocols: column `protocol` of the rows.
-        where: the file or folder that has them.
-
-    Raises:
-        ResultsError: rows of two protocols.
+    Raises ResultsError, which says where they are, for rows of two protocols.
 
     >>> one_protocol(["1.0", "own"], "results.csv")
     '1.0'
@@ -80,11 +75,8 @@ def is_member(family: str, level: float | None) -> bool:
 def spread(changes: Iterable[float]) -> float | None:
     """Return the standard deviation (n - 1) of a number over the reference and the members of its ensemble.
 
-    Args:
-        changes: by how much each member changes the number when it takes the reference's place.
-
-    Returns:
-        The standard deviation in the unit of the changes; None for fewer than LEAST_MEMBERS.
+    changes: by how much each member changes the number when it takes the reference's place. None for fewer
+    than LEAST_MEMBERS.
 
     >>> spread([0.1, -0.1]), spread([0.1])
     (0.1, None)

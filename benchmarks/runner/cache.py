@@ -9,11 +9,11 @@ done again.
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import shutil
 from collections.abc import Mapping
 from contextlib import suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,21 +25,6 @@ from benchmarks.runner.task import Outcome, Task
 from reference_sim.files.atomic_files import replacing
 
 
-@dataclasses.dataclass(frozen=True)
-class Cached:
-    """State of a task before it is run.
-
-    Attributes:
-        why: why it has to be run, or how it failed.
-        outcome: its outcome; None where it has to be run.
-        content: digest of all that other tasks read of it.
-    """
-
-    why: str = ""
-    outcome: Outcome | None = None
-    content: str = "out of date"
-
-
 class Cache:
     """Entries of one run's folder. retry: whether failed tasks are done again; origin: see Outcome."""
 
@@ -48,41 +33,47 @@ class Cache:
     ) -> None:
         self.folder, self.retry, self.origin = folder, retry, origin or {}
 
-    def find(self, task: Task, others: Mapping[TaskId, Cached]) -> Cached:
-        """Return the entry of a task. others: entries of the tasks that it reads."""
+    def find(self, task: Task, others: Mapping[TaskId, Outcome]) -> tuple[str, Outcome | None]:
+        """Return why a task has to be run, or how it failed; and its outcome, None where it has to be run.
+
+        others: outcomes of the tasks that it reads.
+        """
         path = self.path(task)
         if not path.is_file():
-            return Cached("missing")
+            return "missing", None
         entry: dict[str, Any] = {}
         with suppress(ResultsError):
             entry = read_json(path)
         if (entry.get("format"), entry.get("task")) != (FORMAT, task.title):
-            return Cached("missing: its entry is damaged or of another version")
+            return "missing: its entry is damaged or of another version", None
         if lost := self.folder.changed(entry["files"]):
-            return Cached("missing: " + ", ".join(f"{name} is {how}" for name, how in lost.items()))
+            return "missing: " + ", ".join(f"{name} is {how}" for name, how in lost.items()), None
         now, before = dependencies(task, others), entry["parts"]
         if changed := [name for name in now | before if now.get(name) != before.get(name)]:
-            return Cached("stale: " + ", ".join(changed[:3]) + (", ..." if len(changed) > 3 else ""))
+            return "stale: " + ", ".join(changed[:3]) + (", ..." if len(changed) > 3 else ""), None
         files = entry["files"]
-        outcome = Outcome(**entry["outcome"], files=tuple(files), digests=files, origin=entry["origin"])
+        outcome = Outcome(
+            **entry["outcome"], files=tuple(files), digests=files, origin=entry["origin"],
+            content=_content(entry),
+        )  # fmt: skip
         why = outcome.ending if outcome.failed else ""
-        return Cached(why) if why and self.retry else Cached(why, outcome, _content(entry))
+        return why, None if why and self.retry else outcome
 
-    def keep(self, task: Task, outcome: Outcome, others: Mapping[TaskId, Cached]) -> Cached:
-        """Write the entry, after the files, and return it."""
+    def keep(self, task: Task, outcome: Outcome, others: Mapping[TaskId, Outcome]) -> Outcome:
+        """Write the entry, after the files; return the outcome as it is kept."""
         files = {name: digest_of_file(self.folder.path / name) for name in outcome.files}
-        outcome = dataclasses.replace(outcome, digests=files, origin=self.origin | outcome.origin)
+        origin = self.origin | outcome.origin
         entry = {
             "format": FORMAT,
             "task": task.title,
             "parts": dependencies(task, others),
-            "origin": outcome.origin,
+            "origin": origin,
             "files": files,
             "outcome": {name: getattr(outcome, name) for name in _KEPT},
         }
         with replacing(self.path(task)) as temporary:
             temporary.write_text(json.dumps(entry, indent=1, ensure_ascii=False), encoding="utf-8")
-        return Cached("", outcome, _content(entry))
+        return replace(outcome, digests=files, origin=origin, content=_content(entry))
 
     def forget_all(self) -> None:
         """Remove all entries and checkpoints: everything is missing from now on."""
@@ -98,10 +89,10 @@ class Cache:
 _KEPT = ("status", "reason", "failed", "result", "seconds")
 
 
-def dependencies(task: Task, others: Mapping[TaskId, Cached]) -> dict[str, str]:
+def dependencies(task: Task, others: Mapping[TaskId, Outcome]) -> dict[str, str]:
     """Return name -> digest or version of each input, folder of code, package and task that a task reads."""
     inputs = {name: digest(value) for name, value in task.inputs.items()}
-    read = {" ".join(id): others.get(id, Cached(content="")).content for id in (*task.needs, *task.reads)}
+    read = {" ".join(id): others.get(id, Outcome()).content for id in (*task.needs, *task.reads)}
     return inputs | software(*task.code) | read
 
 

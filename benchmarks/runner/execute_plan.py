@@ -73,8 +73,6 @@ def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) ->
     if runner.reused:
         lines.append(f"{len(runner.reused)} results taken from earlier runs in this folder")
     print(*lines, sep="\n", end="\n" if lines else "", file=sys.stderr)
-    if looks := log.config["test_looks"]:
-        print(f"looks at the test motions from this folder: {len(looks)}", file=sys.stderr)
     if report and answer is not None:
         print(log.folder.report_path.resolve(), flush=True)
     return 0 if answer is not None and not failures else 1
@@ -165,16 +163,11 @@ def describe(plan: Plan) -> str:
         f"{len(plan.cells)} cells, {skipped} skipped, {len(plan.cases)} cases",
     ]
     counts: Counter[str] = Counter()
-    for task, found in Runner(tasks_of(plan), Cache(folder, retry=plan.retry)).preview():
+    for task, why, outcome in Runner(tasks_of(plan), Cache(folder, retry=plan.retry)).preview():
         if task.stage != stage:
             stage = task.stage
             lines.append(stage)
-        if found.outcome is None:
-            state, line = "run", f"run ({found.why})"
-        elif found.content:
-            state, line = "cached", f"cached ({found.why})" if found.why else "cached"
-        else:
-            state, line = "skip", f"skip ({found.outcome.reason})"
-        lines.append(f"  {task.title}: {line}")
+        state = "run" if outcome is None else "cached" if outcome.content else "skip"
+        lines.append(f"  {task.title}: {state}" + f" ({why})" * bool(why))
         counts[state] += 1
     return "\n".join([*lines, f"{counts['run']} tasks to run; {counts['cached']} cached"])

@@ -11,7 +11,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from benchmarks.plan.cell import TaskId
-from benchmarks.runner.cache import Cache, Cached
+from benchmarks.runner.cache import Cache
 from benchmarks.runner.executor import Batch, Executor
 from benchmarks.runner.task import Outcome, Task, failure
 
@@ -28,14 +28,12 @@ class Runner:
 
     Attributes:
         outcomes: outcome of every task so far.
-        cached: entry of each task that has one.
         reused: titles of those that an earlier run had finished.
     """
 
     def __init__(self, tasks: Sequence[Task], cache: Cache) -> None:
         self.tasks, self.cache = tuple(tasks), cache
         self.titles = {task.id: task.title for task in self.tasks}
-        self.cached: dict[TaskId, Cached] = {}
         self.outcomes: dict[TaskId, Outcome] = {}
         self.reused: list[str] = []
 
@@ -94,7 +92,7 @@ class Runner:
                     self._keep(task, executor.alone(task, self._needed(task)))
                 bar.update()
                 others = (other for other in tasks[place + 1 :] if other.process == task.process)
-                if not any(self._find(other).outcome is None for other in others):
+                if all(self._find(other)[1] for other in others):
                     executor.release(task.process)
 
     def decide(self, task: Task) -> bool:
@@ -104,27 +102,26 @@ class Runner:
         """
         if task.id in self.outcomes:
             return False
-        found = self._find(task)
-        if found.outcome is None:
+        _, outcome = self._find(task)
+        if outcome is None:
             for name in task.files:
                 (self.cache.folder.path / name).unlink(missing_ok=True)
             return True
-        self.outcomes[task.id] = replace(found.outcome, origin=self.cache.origin | found.outcome.origin)
-        if found.content:
-            self.cached[task.id] = found
+        self.outcomes[task.id] = replace(outcome, origin=self.cache.origin | outcome.origin)
+        if outcome.content:
             self.reused.append(task.title)
         return False
 
-    def _find(self, task: Task) -> Cached:
-        """Return the outcome of a task without running it, or why it has to run."""
+    def _find(self, task: Task) -> tuple[str, Outcome | None]:
+        """Return why a task has to run, or how it failed; and its outcome where that is known."""
         needed = self._needed(task)
         if task.skip:
-            return Cached(f"skip: {task.skip}", Outcome("skipped", task.skip), content="")
+            return task.skip, Outcome("skipped", task.skip)
         for id in task.needs:
             if id not in needed:
                 outcome = self._blocked(id)
-                return Cached(outcome.reason, outcome, content="")
-        return self.cache.find(task, self.cached)
+                return outcome.reason, outcome
+        return self.cache.find(task, self.outcomes)
 
     def _blocked(self, missing: TaskId) -> Outcome:
         """Return the outcome of a task that lacks a need; nothing of it is kept."""
@@ -141,20 +138,19 @@ class Runner:
     def _keep(self, task: Task, outcome: Outcome) -> None:
         """Write the outcome into the cache; one that cannot be written is a failure."""
         try:
-            kept = self.cache.keep(task, outcome, self.cached)
+            kept = self.cache.keep(task, outcome, self.outcomes)
         except (TypeError, ValueError, OSError) as error:  # a result that is no plain value, a file not there
-            kept = self.cache.keep(task, failure(error), self.cached)
-        assert kept.outcome is not None
-        self.cached[task.id], self.outcomes[task.id] = kept, kept.outcome
+            kept = self.cache.keep(task, failure(error), self.outcomes)
+        self.outcomes[task.id] = kept
 
     # --- without running -----------------------------------------------------------------------------------
 
-    def preview(self) -> Iterator[tuple[Task, Cached]]:
-        """Yield each task with what is known of it. One that would be run is taken to succeed."""
+    def preview(self) -> Iterator[tuple[Task, str, Outcome | None]]:
+        """Yield each task and what `_find` says. One that would be run is taken to succeed."""
         for task in self.tasks:
-            found = self.cached[task.id] = self._find(task)
-            self.outcomes[task.id] = found.outcome or Outcome()
-            yield task, found
+            why, outcome = self._find(task)
+            self.outcomes[task.id] = outcome or Outcome(content="out of date")
+            yield task, why, outcome
 
     def broken(self) -> list[str]:
         """Return how tasks failed that have no row."""

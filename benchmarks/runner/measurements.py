@@ -81,12 +81,8 @@ def measured(
 ) -> tuple[dict[str, float | Estimate], dict[str, np.ndarray], tuple[str, str]]:
     """Return metrics and curves of a roll-out, and status and reason where a metric says that it has failed.
 
-    All are empty where no frame is left after the warm-up.
-
-    Args:
-        roll_out: the roll-out, beside those that it is compared with.
-        chosen: names of measurements; None: all that apply.
-        outside: files of users.
+    All are empty where no frame is left after the warm-up. chosen: names of measurements, None for all that
+    apply; outside: files of users.
     """
     metrics: dict[str, float | Estimate] = {}
     curves: dict[str, np.ndarray] = {}

@@ -205,12 +205,10 @@ def pretrained_network(job: NetworkTraining, folder: Path) -> tuple[Path | None,
     if path is None:
         return None, f"no pretrained network {name}: {MAKE}"
     try:
-        inputs = read_header(path)["origin"]["inputs"]
-        names = inputs.keys() | job.inputs.keys()
+        inputs = read_header(path)["origin"].get("inputs", {})
     except TensorFileError as error:
         return path, str(error)
-    except (KeyError, TypeError, AttributeError):
-        return path, f"{path}: says nothing of its training: {MAKE}"
+    names = inputs.keys() | job.inputs.keys()
     others = sorted(n for n in names if n != MACHINE and inputs.get(n) != job.inputs.get(n))
     return path, f"{path}: a network of another training ({', '.join(others)}): {MAKE}" if others else ""
 

@@ -27,6 +27,7 @@ class Outcome:
         digests: name -> digest of these files, once the outcome is kept.
         seconds: wall time [s].
         origin: commit, preset, protocol and hardware of it, once the outcome is known to a run.
+        content: digest of all that other tasks read of it; empty where nothing was kept.
     """
 
     status: str = "ok"
@@ -37,6 +38,7 @@ class Outcome:
     digests: Mapping[str, str] = field(default_factory=dict)
     seconds: float = 0.0
     origin: dict[str, Any] = field(default_factory=dict)
+    content: str = ""
 
     @property
     def ending(self) -> str:

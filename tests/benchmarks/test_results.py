@@ -7,7 +7,6 @@ import dataclasses
 import pytest
 
 from benchmarks.results import run_folder
-from benchmarks.results.protocol import NUMBER, OWN
 from benchmarks.results.row import COLUMNS, ResultsError, Row
 from benchmarks.results.run_folder import RunFolder
 from reports.finished_run import read_run
@@ -33,13 +32,9 @@ def test_rows_come_back_digit_for_digit_and_no_text_of_them_is_a_formula(tmp_pat
     assert sorted(path.name for path in folder.path.iterdir()) == ["results.csv"]
 
 
-def test_a_run_has_the_protocol_of_its_rows_and_no_table_mixes_two(tmp_path):
+def test_no_table_mixes_rows_of_two_protocols(tmp_path):
     folder = RunFolder(tmp_path)
     folder.write_config({"preset": "quick"})
-    folder.write_rows(
-        [dataclasses.replace(ROWS[0], protocol=NUMBER), dataclasses.replace(ROWS[2], protocol=OWN)]
-    )
-    assert read_run(folder).protocol == NUMBER
     folder.write_rows([dataclasses.replace(ROWS[k], protocol=n) for k, n in ((0, "1.0"), (2, "1.1"))])
     with pytest.raises(ResultsError, match=r"results\.csv: rows of protocols 1\.0 and 1\.1 do not stand"):
         read_run(folder)
@@ -67,12 +62,10 @@ COLUMN_LINE, HEAD = ",".join(COLUMNS) + "\n", "scene,method,seed,seconds,strain,
     ("name", "text", "word"),
     [
         ("results.csv", None, ABSENT),
-        ("results.csv", "", "line 0: the columns"),
         ("results.csv", COLUMN_LINE + "1,2\n", "line 2: .*shorter"),
         ("results.csv", COLUMN_LINE + "s,c,m,zero,x,J,1,ok,,,,,,,,,,,1,,,,,,,,,false,\n", "line 2: .*'zero'"),
         ("results.csv", COLUMN_LINE + "\xff\xfe", "line .*utf-8"),
         ("run.json", "{", "not readable as JSON"),
-        ("run.json", "[1]", "holds no JSON object"),
         ("run.json", '{"preset": "smoke"}', "written by an earlier version .* new folder"),
         ("frame_energies.csv", "scene,method,seed,seconds\n", "the columns should be scene,method,seed"),
         ("frame_energies.csv", HEAD + "kick,snug,0,0.1,1,2\nkick,snug,0,0.2,high,2\n", "high"),

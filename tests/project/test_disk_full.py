@@ -85,7 +85,7 @@ def test_a_run_stops_in_one_line_and_goes_on(tmp_path, monkeypatch, capsys):
     assert run.main([*arguments, str(other.path)]) == 0  # kernels that it compiles are files that grow, too
     (trajectory,) = other.path.rglob("simulation.vtkhdf")
     limit = trajectory.stat().st_size - 1000
-    monkeypatch.setattr(execution, "Executor", lambda folder, assets, workers: InProcess(folder, assets))
+    monkeypatch.setattr(execution, "Executor", lambda folder, assets, *_: InProcess(folder, assets))
     with files_up_to(limit):
         status = run.main([*arguments, str(folder.path)])
     errors = capsys.readouterr().err

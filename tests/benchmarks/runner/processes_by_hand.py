@@ -9,7 +9,6 @@ import signal
 import subprocess
 import sys
 import time
-from contextlib import suppress
 from functools import partial
 from pathlib import Path
 
@@ -102,6 +101,7 @@ def chain(sleep: float = 0.0) -> list[Task]:
 
 def executor(folder: Path, address: str = "", workers: int = 1) -> Executor:
     """Return the executor of a cluster, or without an address of processes here."""
+    folder.mkdir(exist_ok=True)
     run = RunFolder(folder)
     return Executor(run, None, workers, Cluster(run, None, address) if address else None)
 
@@ -146,14 +146,8 @@ class Dask:
         self.address = json.loads(file.read_text())["address"]
 
     def restart_scheduler(self) -> None:
-        """Kill it and start another at its address; the workers end by themselves."""
-        self.scheduler.kill()
-        self.scheduler.wait()
-        for worker in self.workers:
-            with suppress(subprocess.TimeoutExpired):  # one that had not found it yet goes on looking
-                worker.wait(5)
-            worker.kill()
-            worker.wait()
+        """Kill it and then its workers, and start another at its address."""
+        self.__exit__()
         self.workers.clear()
         self.start_scheduler(self.address.rpartition(":")[2])
 
@@ -171,7 +165,7 @@ class Dask:
             )  # fmt: skip
 
     def __exit__(self, *_) -> None:
-        for process in (*self.workers, self.scheduler):
+        for process in (self.scheduler, *self.workers):
             process.kill()
             process.wait()
 

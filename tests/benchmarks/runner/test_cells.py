@@ -19,8 +19,8 @@ from tests.benchmarks.runner.tasks_by_hand import TINY, InProcess, finish, outco
 def why(plan: Plan, kind: str = "cell", number: int = 0) -> str:
     """Return why a cell, or what follows it, has to be run; "finished" where it has not."""
     runner = Runner(tasks_of(plan), Cache(RunFolder(plan.folder), retry=plan.retry))
-    found = {task.id: found for task, found in runner.preview()}[kind, plan.cells[number].name]
-    return found.why or "finished"
+    found = {task.id: why for task, why, _ in runner.preview()}
+    return found[kind, plan.cells[number].name] or "finished"
 
 
 def rows(runner: Runner, plan: Plan) -> dict[str, Row]:

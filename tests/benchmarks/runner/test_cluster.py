@@ -29,37 +29,12 @@ pytest.importorskip("distributed")
 KILLS = int(os.environ.get("KILLS", "10"))  # of the processes here, and as many of the cluster
 
 
-@pytest.fixture(scope="module")
-def two(tmp_path_factory):
-    """A scheduler and two workers, for all tests that kill neither."""
-    with Dask(tmp_path_factory.mktemp("cluster"), 2) as started:
-        yield started
-
-
-@pytest.fixture(scope="module")
-def expected(tmp_path_factory) -> dict[str, str]:
-    """The files of all tasks, done by processes here."""
-    folder = tmp_path_factory.mktemp("expected")
-    finish(folder, *chain())
-    return files(folder)
-
-
 def files(folder: Path) -> dict[str, str]:
     """Name -> text, of what is whole and of what is not."""
     return {path.name: path.read_text() for path in sorted(folder.rglob("*.txt"))}
 
 
 # --- what comes back ---------------------------------------------------------------------------------------
-
-
-@pytest.mark.slow
-def test_a_cluster_leaves_the_same_files_as_processes_here(two, folder, expected):
-    options = {"address": two.address, "origin": {"commit": "c", "hardware": "h"}}
-    runner = finish(folder.path, *chain(), **options)
-    assert len(expected) == 12 and files(folder.path) == expected
-    origins = [outcome.origin for outcome in runner.outcomes.values()]
-    assert {o["commit"] for o in origins} == {"c"} and "h" not in {o["hardware"] for o in origins}
-    assert len(finish(folder.path, *chain(), **options).reused) == 12
 
 
 @pytest.mark.slow
@@ -88,23 +63,23 @@ def test_a_run_on_a_cluster_is_that_of_this_machine(tmp_path, monkeypatch):
 
 
 @pytest.mark.slow
-def test_a_worker_of_other_software_or_without_the_folder_ends_the_run_in_one_line(two, folder, monkeypatch):
-    software_of = scheduler.software_of
-    with monkeypatch.context() as patch:
-        patch.setattr(scheduler, "software_of", lambda task: software_of(task) | {"package numpy": "1.0"})
-        other = r"^worker tcp:.*\(package numpy\); install the same there as here"
-        with pytest.raises(RunStopped, match=other):
-            together(folder.path, [task("one")], address=two.address)
-    do = scheduler.Cluster.do
+def test_a_worker_of_other_software_or_without_the_folder_ends_the_run_in_one_line(tmp_path, monkeypatch):
+    software_of, do, folder = scheduler.software_of, scheduler.Cluster.do, tmp_path / "run"
 
     def without_folder(self, *arguments):
         self.assets.unlink()
         return do(self, *arguments)
 
-    monkeypatch.setattr(scheduler.Cluster, "do", without_folder)
-    with pytest.raises(RunStopped, match=r"worker tcp:.*does not see the run's folder .*--out"):
-        together(folder.path, [task("one")], address=two.address)
-    assert list(folder.path.iterdir()) == []
+    with Dask(tmp_path, 1) as started:
+        with monkeypatch.context() as patch:
+            patch.setattr(scheduler, "software_of", lambda task: software_of(task) | {"package numpy": "1.0"})
+            other = r"^worker tcp:.*\(package numpy\); install the same there as here"
+            with pytest.raises(RunStopped, match=other):
+                together(folder, [task("one")], address=started.address)
+        monkeypatch.setattr(scheduler.Cluster, "do", without_folder)
+        with pytest.raises(RunStopped, match=r"worker tcp:.*does not see the run's folder .*--out"):
+            together(folder, [task("one")], address=started.address)
+    assert list(folder.iterdir()) == []
 
 
 def test_where_nobody_answers_and_without_dask_the_remedy_is_said(monkeypatch):
@@ -127,26 +102,28 @@ def test_what_a_cluster_cannot_do_is_refused(field, value, tmp_path, monkeypatch
 
 
 @pytest.mark.slow
-def test_a_task_that_three_workers_died_of_has_failed_and_the_others_go_on(folder, tmp_path):
+def test_a_task_that_three_workers_died_of_has_failed_and_the_others_go_on(tmp_path):
     with Dask(tmp_path, 0) as started:
         started.add("--nanny")  # which starts a worker again
         batch = [task("deadly", "die with the worker", batch="b"), task("after", batch="b")]
-        outcomes = together(folder.path, batch, [task("bad", "raise")], address=started.address)
+        outcomes = together(tmp_path / "run", batch, [task("bad", "raise")], address=started.address)
     assert outcomes["deadly"].failed and "workers died while they did it" in outcomes["deadly"].reason
     assert outcomes["after"].status == "ok" and outcomes["bad"].reason == "ValueError: broken on purpose"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("workers", [0, 2])
-def test_killed_at_random_moments_the_files_are_the_same(folder, tmp_path, expected, workers):
+def test_killed_at_random_moments_the_files_are_the_same(tmp_path, workers):
     """The runner, a worker, the scheduler; here a task's process. What was finished is not done again."""
+    finish(tmp_path / "undisturbed", *chain())
+    expected, folder = files(tmp_path / "undisturbed"), tmp_path / "run"
     chance, kills, begun = random.Random(7), 0, tmp_path / "begun"
     begun.touch()
     with Dask(tmp_path, workers) if workers else nullcontext() as cluster:
         options = {"address": cluster.address if cluster else "", "workers": 2, "retry": True}
         while kills < KILLS:
             runner = get_context("spawn").Process(
-                target=finish, args=(folder.path, *chain(sleep=0.3)), kwargs=options
+                target=finish, args=(folder, *chain(sleep=0.3)), kwargs=options
             )
             runner.start()
             while kills < KILLS and runner.is_alive():
@@ -155,16 +132,16 @@ def test_killed_at_random_moments_the_files_are_the_same(folder, tmp_path, expec
                 time.sleep(chance.uniform(0.0, 0.6))
                 if not runner.is_alive():
                     break
-                kept = {path: path.read_bytes() for path in folder.path.glob("cache/**/*.json")}
+                kept = {path: path.read_bytes() for path in folder.glob("cache/**/*.json")}
                 kill_one(chance, cluster, runner, int(begun.read_text().split()[-1]))
                 kills += 1
                 assert {path: path.read_bytes() for path in kept} == kept
             runner.join(120)
-            if files(folder.path) == expected:  # begin again: there are kills left
-                for path in folder.path.rglob("*.json"):
+            if files(folder) == expected:  # begin again: there are kills left
+                for path in folder.rglob("*.json"):
                     path.unlink()
-        finish(folder.path, *chain(), **options)
-    assert files(folder.path) == expected
+        finish(folder, *chain(), **options)
+    assert len(expected) == 12 and files(folder) == expected
     until(lambda: not any(alive(int(pid)) for pid in begun.read_text().split()[1::2]), 15.0)
 
 

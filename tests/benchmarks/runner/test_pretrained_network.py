@@ -91,7 +91,7 @@ def test_a_network_of_another_processor_is_taken_and_what_is_none_is_refused_in_
     path.write_bytes(b"half")
     assert "pbns-tshirt.safetensors: not a safetensors file" in pretrained_network(job, tmp_path)[1]
     dataclasses.replace(TrainedModel.load(job.path(RunFolder(made[0]))), origin={}).save(path)
-    assert "says nothing of its training" in pretrained_network(job, tmp_path)[1]
+    assert "a network of another training (assets, " in pretrained_network(job, tmp_path)[1]
 
 
 def test_a_run_from_files_simulates_and_trains_nothing_but_a_users_own(made, tmp_path):

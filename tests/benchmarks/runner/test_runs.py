@@ -158,10 +158,6 @@ def hang() -> None:
     signal.pause()
 
 
-def wrong() -> None:
-    raise RuntimeError("lost")
-
-
 def case(function: str, seconds: float = 60.0, **declared) -> Case:
     return Case(
         name=function, suite="extremes", description="", module=__name__, function=function, seconds=seconds,
@@ -176,14 +172,12 @@ def rows_of_cases(folder, *cases: Case, processes: bool = False):
 
 
 def test_what_did_not_come_back_is_a_failed_row_and_the_next_case_is_run(tmp_path):
-    cases = case("hang", 0.5, expected=0.0), *(case(name) for name in ("warmth", "wrong", "absent"))
-    (hung, next_one, *others), _ = rows_of_cases(tmp_path, *cases, processes=True)
+    cases = case("hang", 0.5, expected=0.0), case("warmth"), case("absent")
+    (hung, next_one, absent), _ = rows_of_cases(tmp_path, *cases, processes=True)
     assert (hung.status, hung.value, hung.expected) == ("failed", None, 0.0)
     assert "no answer within 0.5 s" in hung.reason
     assert (next_one.status, next_one.value) == ("ok", 1.0)  # a new process is warmed up anew
-    assert [(row.status, row.value) for row in others] == [("failed", None)] * 2
-    for row, message in zip(others, ("RuntimeError: lost", "AttributeError"), strict=True):
-        assert message in row.reason
+    assert (absent.status, absent.value) == ("failed", None) and "AttributeError" in absent.reason
 
 
 def test_a_case_is_computed_once_and_again_when_it_declares_something_else(tmp_path):

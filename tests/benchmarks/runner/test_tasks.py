@@ -67,9 +67,10 @@ def test_a_dry_run_decides_as_the_run_does(tmp_path):
             task("fourth"),
         )  # fmt: skip
         preview = Runner(tasks, Cache(RunFolder(tmp_path), **options)).preview()
-        planned = {task.name for task, found in preview if found.outcome is None}
+        planned = {task.name for task, _, outcome in preview if outcome is None}
         runner = finish(tmp_path, *tasks, **options)
-        return planned, {id[1] for id in runner.cached} - {title.split()[1] for title in runner.reused}
+        kept = {name for (_, name), outcome in runner.outcomes.items() if outcome.content}
+        return planned, kept - {title.split()[1] for title in runner.reused}
 
     everything = {"first", "second", "third", "fourth"}
     assert planned_and_done("raise") == (everything, everything - {"second"})
@@ -92,7 +93,7 @@ def test_what_is_damaged_is_done_again_alone_where_it_comes_back_as_it_was(tmp_p
     finish(tmp_path, *tasks)
     assert len(finish(tmp_path, *tasks).reused) == 3
     (tmp_path / name).unlink() if text is None else (tmp_path / name).write_text(text)
-    assert Cache(RunFolder(tmp_path)).find(tasks[0], {}).why == why
+    assert Cache(RunFolder(tmp_path)).find(tasks[0], {}) == (why, None)
     runner = finish(tmp_path, *tasks)
     assert (tmp_path / "first.txt").read_text() == "first"
     assert sorted(runner.reused) == ["network second", "network third"]
