@@ -19,7 +19,7 @@ from benchmarks.runner.cache import Cache
 from benchmarks.runner.executor import Executor
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.rows import rows_of
-from benchmarks.runner.run_json import RunLog, now
+from benchmarks.runner.run_json import RunLog
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.runner.task import RunRefused, one_line
 
@@ -62,7 +62,6 @@ def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) ->
     rows = rows_of(plan, runner.tasks, runner.outcomes)
     log.write_rows(rows)
     log.note_outcomes(runner)
-    log.note("finished", now())
     answer = make_report(log) if report else ""
     print(*filter(None, (answer, summary(log.rows))), sep="\n", flush=True)
     failed = [row for row in log.rows if not accepted(row)]
@@ -86,18 +85,15 @@ def check_roll_outs(plan: Plan) -> Assets | None:
     stored = [cell for cell in plan.cells if cell.entry.module == MODULE]
     if not stored:
         return None
+    assets = None
     try:
         assets = plan.open_assets() if plan.garments else None
+        for cell in stored:
+            cell.entry.make(models=plan.folder, seed=0).prepare(cell.scene.build(assets))
+    except RollOutFileError:
+        raise
     except ValueError:
-        return None  # the run says so itself, of all dressed scenes
-    for cell in stored:
-        try:
-            scene = cell.scene.build(assets)
-        except RollOutFileError:
-            raise
-        except ValueError:
-            continue  # of a scene that cannot be built the run says so itself, for all methods
-        cell.entry.make(models=plan.folder, seed=0).prepare(scene)
+        pass  # of what cannot be made or built the run says so itself, for all methods
     return assets
 
 

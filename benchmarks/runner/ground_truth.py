@@ -69,7 +69,6 @@ def simulate_motion(scene: Scene, entry: MethodEntry, context: Context, needed: 
         "whole": trajectory.frames == built.frames,
         "status": trajectory.status,
         "reason": trajectory.reason,
-        "converged": trajectory.status == "converged",
     }
     return Outcome(result=result, files=(run.relative(path),))
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import numbers
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -47,7 +47,13 @@ def measure_cell(
     if curves:
         curves[SECONDS] = np.array(roll_out.trajectory.times[: len(roll_out.positions)], dtype=float)
         curves[SECONDS][: roll_out.scene.warm_up] = np.nan
-    write_curves(path, curves, roll_out.trajectory.frames)
+    frames = roll_out.trajectory.frames
+    padded: dict[str, Any] = {  # nan after the last frame that was measured
+        name: np.pad(curve, [(0, frames - len(curve))] + [(0, 0)] * (curve.ndim - 1), constant_values=np.nan)
+        for name, curve in curves.items()
+    }
+    with replacing(path) as temporary:
+        np.savez(temporary, **padded)
     return Outcome(status, reason, result=metrics, files=(folder.relative(path),))
 
 
@@ -134,16 +140,6 @@ def compared(
         uncertainty = spread(change for _, change in moved)
         estimates[name] = value if uncertainty is None else Estimate(value, uncertainty, moved)
     return estimates
-
-
-def write_curves(path: Path, curves: Mapping[str, np.ndarray], frames: int) -> None:
-    """Write an .npz of curves (T,...), nan after the last frame that was measured."""
-    padded: dict[str, Any] = {
-        name: np.pad(curve, [(0, frames - len(curve))] + [(0, 0)] * (curve.ndim - 1), constant_values=np.nan)
-        for name, curve in curves.items()
-    }
-    with replacing(path) as temporary:
-        np.savez(temporary, **padded)
 
 
 def _positions(path: Path) -> np.ndarray:

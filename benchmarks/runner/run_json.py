@@ -34,16 +34,13 @@ class RunLog:
         self.plan = plan
         body, garment = plan.inputs.body, plan.inputs.garment
         self.folder = RunFolder(plan.folder)
-        self.hardware = provenance.hardware(plan.device)
-        # Only training uses an accelerator: its rows name it, see networks.train.
-        hardware = provenance.hardware_line(self.hardware | {"accelerator": None})
         self.origin = {
             "commit": provenance.commit(), "preset": plan.preset.name, "protocol": NUMBER,
-            "hardware": hardware,
+            # Only training uses an accelerator: its rows name it, see networks.train.
+            "hardware": provenance.hardware_line(provenance.hardware()),
         }  # fmt: skip
         self.cache = Cache(self.folder, retry=plan.retry, origin=self.origin)
         self.rows: list[Row] = []
-        self.stages: list[dict[str, Any]] = []
         before = self.folder.read_config() if self.folder.config_path.is_file() else {}
         self.config: dict[str, Any] = {
             "command": plan.command,
@@ -65,10 +62,10 @@ class RunLog:
             "commit": self.origin["commit"],
             "started": now(),
             "finished": None,
-            "hardware": self.hardware,
+            "hardware": provenance.hardware(plan.device),
             "versions": provenance.versions(),
             "preset_values": dataclasses.asdict(plan.preset),
-            "stages": self.stages,
+            "stages": [],
             "test_looks": before.get("test_looks") or [],
             # What the rows there mean, until there are others.
             **{name: before[name] for name in OF_ROWS if name in before},
@@ -79,11 +76,6 @@ class RunLog:
             self.cache.forget_all()
         self.folder.write_config(self.config)
 
-    def note(self, name: str, value: Any) -> None:
-        """Set an entry of run.json and write it."""
-        self.config[name] = value
-        self.folder.write_config(self.config)
-
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
         """Announce a stage and keep its wall time, also when it is interrupted."""
@@ -92,7 +84,8 @@ class RunLog:
         try:
             yield
         finally:
-            self.stages.append({"name": name, "seconds": round(time.perf_counter() - clock, 3)})
+            seconds = round(time.perf_counter() - clock, 3)
+            self.config["stages"].append({"name": name, "seconds": seconds})
             self.folder.write_config(self.config)
 
     def open_assets(self, made: Assets | None = None) -> Assets:
@@ -104,11 +97,12 @@ class RunLog:
             for name, g in assets.garments.items()
         }
         self.config["motions"]["frames"] = {name: motion.frames for name, motion in assets.motions.items()}
-        self.note("motion_sources", {name: motion.source for name, motion in assets.motions.items()})
+        self.config["motion_sources"] = {name: motion.source for name, motion in assets.motions.items()}
+        self.folder.write_config(self.config)
         return assets
 
     def note_outcomes(self, runner: Runner) -> None:
-        """Note the outcomes of ground truth, trainings and cells."""
+        """Note the outcomes of ground truth, trainings and cells, and that the run has finished."""
         of_kind: dict[str, dict[str, Any]] = {}
         for task in runner.tasks:
             outcome = runner.outcomes[task.id]
@@ -116,7 +110,7 @@ class RunLog:
                 failed = {"failed": f"{outcome.status}: {outcome.reason}"} if outcome.failed else {}
                 facts = {**outcome.result, **failed, "wall_seconds": round(outcome.seconds, 3)}
                 of_kind.setdefault(task.stage, {})[task.label] = facts
-        self.config["tasks"] = of_kind
+        self.config["tasks"], self.config["finished"] = of_kind, now()
         for outcome in runner.outcomes.values():
             self.config["digests"] |= outcome.digests
         self.folder.write_config(self.config)

@@ -24,16 +24,6 @@ def work(seconds: float) -> None:
         pass
 
 
-def test_the_time_of_honest_work_is_believed():
-    def run():
-        work(0.1)
-        return np.zeros((2, 3, 3))
-
-    made, reading = clocked(run, of=positions_of)
-    assert made.shape == (2, 3, 3) and reading.complaint == ""
-    assert reading.seconds >= 0.1
-
-
 def test_what_is_made_only_when_it_is_looked_at_is_made_on_the_clock():
     class Lazy:
         def __array__(self, dtype=None, copy=None):
