@@ -147,7 +147,7 @@ def software_of(task: Task) -> dict[str, str]:
     return software("benchmarks/runner", *task.code) | digests | {"package Python": platform.python_version()}
 
 
-# --- in a worker -------------------------------------------------------------------------------------------
+# --- in a worker ---
 
 _processes: dict[int, tuple[Path, TaskProcess]] = {}  # of each thread: path of its assets, and it
 

@@ -148,7 +148,7 @@ def end_group(pid: int) -> None:
         os.killpg(pid, signal.SIGKILL)
 
 
-# --- in the process ----------------------------------------------------------------------------------------
+# --- in the process ---
 
 
 def _serve(pipe: Connection, folder: RunFolder, assets: Assets | None) -> None:

@@ -43,8 +43,6 @@ class Runner:
         refused = Outcome("failed", reason, failed=True, origin=self.cache.origin)
         self.outcomes |= dict.fromkeys(ids, refused)
 
-    # --- running -------------------------------------------------------------------------------------------
-
     def run(self, executor: Executor, log: RunLog | None = None) -> None:
         """Do all tasks: untimed ones side by side until the others wait for timed ones, and these one by one.
 
@@ -142,8 +140,6 @@ class Runner:
         except (TypeError, ValueError, OSError) as error:  # a result that is no plain value, a file not there
             kept = self.cache.keep(task, failure(error), self.outcomes)
         self.outcomes[task.id] = kept
-
-    # --- without running -----------------------------------------------------------------------------------
 
     def preview(self) -> Iterator[tuple[Task, str, Outcome | None]]:
         """Yield each task and what `_find` says. One that would be run is taken to succeed."""

@@ -114,8 +114,6 @@ class Schedule:
         yield from (self.metrics(cell) for cell in plan.cells if runs(cell))
         yield from map(self.case, plan.cases)
 
-    # --- ground truth and training -------------------------------------------------------------------------
-
     def start(self, scene: Scene) -> Task:
         """Return the task that settles the garment of a scene."""
         return Task(
@@ -203,8 +201,6 @@ class Schedule:
             key=digest(digests | software(*RUNNING, *users_code(network.declared_in))),
         )  # fmt: skip
 
-    # --- cells ---------------------------------------------------------------------------------------------
-
     def cells(self, cells: list[Cell]) -> Iterator[Task]:
         """Yield the runs, then repeats in rounds, the order of the methods rotated from round to round.
 
@@ -261,8 +257,6 @@ class Schedule:
         """Return the seconds that each of its repeats has to measure, so that it is enough together."""
         return self.preset.least_seconds / (self.preset.repeats if "speed" in cell.suites else 1)
 
-    # --- measurements --------------------------------------------------------------------------------------
-
     def quasi_static(self, scene: Scene) -> Task:
         """Return the task that simulates each frame of a scene held still."""
         return Task(
@@ -306,8 +300,6 @@ class Schedule:
             code=(find_module(case.module), *CASES),
         )  # fmt: skip
 
-    # --- inputs ---------------------------------------------------------------------------------------------
-
     def _machine(self, device: str = "cpu") -> dict[str, Any]:
         """Return the machine, as times of another are not reused. device: of a training; else cpu."""
         facts = provenance.hardware(device)
@@ -345,8 +337,6 @@ class Schedule:
         """
         files = self.plan.inputs.motions
         return f"{name} {digest(files[name])}" if name in files else name
-
-    # --- facts of the plan ---------------------------------------------------------------------------------
 
     def _learned(self, network: Network) -> tuple[tuple[str, ...], tuple[str, ...]]:
         """Return the motions that a network trains on, and those that stop its training."""

@@ -22,7 +22,7 @@ from benchmarks.runner.executor import Executor
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.task import Context, Outcome, Task
 
-# --- tasks -------------------------------------------------------------------------------------------------
+# --- tasks ---
 
 
 def fail(how: str) -> None:
@@ -96,7 +96,7 @@ def chain(sleep: float = 0.0) -> list[Task]:
     ]
 
 
-# --- what does them ----------------------------------------------------------------------------------------
+# --- what does them ---
 
 
 def executor(folder: Path, address: str = "", workers: int = 1) -> Executor:

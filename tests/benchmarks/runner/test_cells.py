@@ -28,9 +28,6 @@ def rows(runner: Runner, plan: Plan) -> dict[str, Row]:
     return {row.metric: row for row in rows_of(plan, runner.tasks, runner.outcomes)}
 
 
-# --- what goes wrong ---------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(
     ("how", "word"),
     [
@@ -68,9 +65,6 @@ def test_what_a_cell_has_run_stands_where_many_go_wrong(tmp_path):
     assert "many at once: failed: RuntimeError: no two bodies" in first["cost/frame"].reason
     assert RunFolder(tmp_path).trajectory_path("free_fall", "newton-1").is_file()
     assert rows(finish(plan, "cells", "metrics"), plan).keys() == first.keys()
-
-
-# --- what a cell says of itself, and what is kept ----------------------------------------------------------
 
 
 def test_a_cell_says_how_long_it_took_and_how_much_memory(tmp_path):
@@ -116,9 +110,6 @@ def test_a_cell_that_is_run_again_leaves_nothing_of_its_earlier_run(tmp_path):
     assert measured_after(0) == []  # the others are compared with it
     outcome_of(plan_of(tmp_path, "simulation", "newton-1", how="raise"), 1)
     assert not folder.trajectory_path("free_fall", "newton-1").exists()
-
-
-# --- repeats -----------------------------------------------------------------------------------------------
 
 
 def test_repeats_take_turns_and_are_kept(tmp_path, monkeypatch):

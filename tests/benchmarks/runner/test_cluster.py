@@ -34,9 +34,6 @@ def files(folder: Path) -> dict[str, str]:
     return {path.name: path.read_text() for path in sorted(folder.rglob("*.txt"))}
 
 
-# --- what comes back ---------------------------------------------------------------------------------------
-
-
 @pytest.mark.slow
 def test_a_run_on_a_cluster_is_that_of_this_machine(tmp_path, monkeypatch):
     """Bit for bit, but for times: a network that learned from ground truth, and metrics of all frames."""
@@ -57,9 +54,6 @@ def test_a_run_on_a_cluster_is_that_of_this_machine(tmp_path, monkeypatch):
 
     with Dask(tmp_path, 2) as started:
         assert kept("there", "--scheduler", started.address) == kept("here")
-
-
-# --- what is refused ---------------------------------------------------------------------------------------
 
 
 @pytest.mark.slow
@@ -96,9 +90,6 @@ def test_what_a_cluster_cannot_do_is_refused(field, value, tmp_path, monkeypatch
     monkeypatch.setattr("snug.training.device.find_device", lambda name: None)
     with pytest.raises(StudyError, match=f"{field}: .*leave out --scheduler"):
         check_machines(study_with(**{field: value}), tmp_path, "tcp://127.0.0.1:1")
-
-
-# --- kills -------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.slow

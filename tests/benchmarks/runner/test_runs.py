@@ -33,9 +33,6 @@ def words_of(folder: Path, methods: str) -> list[str]:
     return [*WORDS, "-o", str(folder), "--methods", methods]
 
 
-# --- one run at a time -------------------------------------------------------------------------------------
-
-
 def test_a_second_run_in_the_same_folder_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
     options, answers = words_of(tmp_path / "run", "simulation"), []
 
@@ -68,9 +65,6 @@ def test_what_a_killed_run_was_writing_is_removed_and_a_fresh_one_goes_on_from_n
     assert not stopped.exists()
 
 
-# --- interrupts and kills ----------------------------------------------------------------------------------
-
-
 def test_an_interrupt_leaves_the_table_and_what_is_finished(tmp_path, monkeypatch, capsys):
     options = words_of(tmp_path, "simulation,newton-4")
     assert run.main(options) == 0
@@ -94,9 +88,6 @@ def test_a_failed_task_that_no_row_speaks_of_makes_the_exit_status_1(tmp_path, m
     monkeypatch.setattr(execution, "tasks_of", lambda plan: [task("lame", "raise")])
     assert execution.execute(plan_of(tmp_path)) == 1
     assert "network lame: failed: ValueError: broken on purpose" in capsys.readouterr().err
-
-
-# --- kept files --------------------------------------------------------------------------------------------
 
 
 WORN = "trajectories/tshirt-sudden_stop"
@@ -140,9 +131,6 @@ def test_every_kind_of_kept_file_is_made_again_and_the_numbers_are_the_same(dres
     assert run_dressed(folder) == dressed[1]
     config = RunFolder(folder).read_config()
     assert set(config["digests"]) == set(digests) and not RunFolder(folder).changed(config["digests"])
-
-
-# --- cases -------------------------------------------------------------------------------------------------
 
 
 def warmth() -> float:

@@ -17,8 +17,6 @@ def statuses(runner: Runner) -> dict[str, str]:
     return {name: outcome.status for (_, name), outcome in runner.outcomes.items()}
 
 
-# --- events ------------------------------------------------------------------------------------------------
-
 EVENTS = [
     ("raise", "failed", "ValueError: broken on purpose", ""),
     ("die", "out-of-memory", "SIGKILL: the system was out of memory", "its own"),
@@ -99,9 +97,6 @@ def test_what_is_damaged_is_done_again_alone_where_it_comes_back_as_it_was(tmp_p
     assert sorted(runner.reused) == ["network second", "network third"]
 
 
-# --- order -------------------------------------------------------------------------------------------------
-
-
 class TwoAtOnce(InProcess):
     """Two workers, of which the one that began first ends first; writes down what is at work at a time."""
 
@@ -140,9 +135,6 @@ def test_a_task_begins_when_its_needs_are_there_and_nothing_is_beside_a_timed_ta
         ["long", "short"], ["short"], ["one", "two", "next"], ["next"], ["three"], ["timed"], ["after"],
     ]  # fmt: skip
     assert set(statuses(runner).values()) == {"ok"}
-
-
-# --- processes ---------------------------------------------------------------------------------------------
 
 
 def test_a_batch_stays_together_and_nothing_is_kept_between_batches(tmp_path):
