@@ -65,6 +65,7 @@ def simulate_motion(scene: Scene, entry: MethodEntry, context: Context, needed: 
     # Without what the clock showed: the same simulation has the same bytes wherever it is done.
     replace(trajectory, frame_seconds=trajectory.frame_seconds[:0]).save(path)
     result = {
+        "motion": scene.motion,
         "frames": trajectory.frames,
         "whole": trajectory.frames == built.frames,
         "status": trajectory.status,

@@ -44,8 +44,7 @@ class NetworkTraining:
         steps: of the training.
         motions: what it learns from.
         held_out: motions that stop it, where it goes on until it has converged.
-        simulated: motion -> the task that simulates it, where it learns from simulations.
-        clips: tasks that simulate mixed clips.
+        reads: tasks that simulate motions and mixed clips, where it learns from simulations.
         device: cpu or cuda, for every part of a step.
         inputs: name -> digest of each input.
         key: digest of inputs, code and packages. With equal simulations, a training of the same key that was
@@ -56,16 +55,10 @@ class NetworkTraining:
     steps: int
     motions: tuple[str, ...]
     held_out: tuple[str, ...] = ()
-    simulated: Mapping[str, TaskId]
-    clips: tuple[TaskId, ...] = ()
+    reads: tuple[TaskId, ...] = ()
     device: str
     inputs: Mapping[str, str]
     key: str
-
-    @property
-    def reads(self) -> tuple[TaskId, ...]:
-        """The tasks that simulate what it learns from."""
-        return (*self.simulated.values(), *self.clips)
 
     @property
     def work(self) -> float:
@@ -98,9 +91,8 @@ def train(job: NetworkTraining, context: Context, needed: Needed) -> Outcome:
     dressed = DressedBody(assets.body, assets.garments[job.network.garment])
     motions, targets = job.motions, None
     mixed: list[Motion] = []
-    if job.simulated:
-        there = {m: needed[id] for m, id in job.simulated.items() if id in needed}
-        whole = {motion: outcome for motion, outcome in there.items() if outcome.result["whole"]}
+    if job.reads:
+        whole = {o.result["motion"]: o for o in needed.values() if o.result.get("whole")}
         motions = tuple(motion for motion in job.motions if motion in whole)
         targets = {m: Trajectory.load(run.path / o.files[0]).positions for m, o in whole.items()}
         mixed, simulated = mixed_clips(job, assets, run, needed)
@@ -161,8 +153,8 @@ def origin_of(job: NetworkTraining, needed: Needed, *, left_out: list[str]) -> d
         "held_out": list(job.held_out),
         "simulated_by": simulated.method if simulated else "",
         "left_out": left_out,
-        "clips_left_out": sum(len(needed[id].result["left_out"]) for id in job.clips if id in needed),
-        "data_seconds": sum(needed[id].seconds for id in job.reads if id in needed),
+        "clips_left_out": sum(len(outcome.result.get("left_out", ())) for outcome in needed.values()),
+        "data_seconds": sum(outcome.seconds for outcome in needed.values()),
         "commit": provenance.commit(),
         "hardware": provenance.hardware(job.device),
         "versions": provenance.versions(),
@@ -179,13 +171,13 @@ def mixed_clips(
     from snug.training.augmentation import make_shared_clips
 
     vertices_of: dict[str, np.ndarray] = {}
-    for id in job.clips:
-        if id in needed:
-            vertices_of |= read_arrays(folder.path / needed[id].files[0])
+    parts = [id for id in job.reads if id[0] == "clips"]
+    for outcome in (needed[id] for id in parts if id in needed):
+        vertices_of |= read_arrays(folder.path / outcome.files[0])
     if twice := sorted(vertices_of.keys() & set(job.motions)):
         raise ValueError(f"training motion {twice[0]!r}: a mixed clip is called so: rename its file")
     vertices = len(assets.garments[job.network.garment].rest_positions)
-    clips = make_shared_clips(assets.named(job.motions), len(job.clips), vertices=vertices)
+    clips = make_shared_clips(assets.named(job.motions), len(parts), vertices=vertices)
     return [clip for clip in clips if clip.name in vertices_of], vertices_of
 
 

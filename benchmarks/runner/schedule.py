@@ -193,11 +193,9 @@ class Schedule:
             "held out": {name: self._motion(name) for name in held_out},
         }  # fmt: skip
         digests = {name: digest(value) for name, value in inputs.items()}
-        ids = [task.id for task in self.ground_truth(network)]
         return NetworkTraining(
             network=network, steps=steps, motions=motions, held_out=held_out, device=self.plan.device,
-            simulated=dict(zip((*motions, *held_out), [id for id in ids if id[0] == "data"])),
-            clips=tuple(id for id in ids if id[0] == "clips"), inputs=digests,
+            reads=tuple(task.id for task in self.ground_truth(network)), inputs=digests,
             key=digest(digests | software(*RUNNING, *users_code(network.declared_in))),
         )  # fmt: skip
 

@@ -40,12 +40,12 @@ def write_training_motions(garment: str, plan: Plan, out: Path) -> list[str]:
         runner = Runner(schedule.ground_truth(network), Cache(run, retry=True))
         runner.run(Executor(run, assets, plan.workers))
         files: dict[str, str] = {}
-        for motion, id in schedule.training(network).simulated.items():
-            outcome = runner.outcomes[id]
+        for task in runner.tasks:
+            outcome = runner.outcomes[task.id]
             if outcome.failed or not outcome.result["whole"]:
                 why = outcome.reason or outcome.result.get("reason", "")
-                raise StudyError(f"training motion {motion}: {outcome.status}: {why}")
-            files[motion] = outcome.files[0]
+                raise StudyError(f"training motion {task.label}: {outcome.status}: {why}")
+            files[outcome.result["motion"]] = outcome.files[0]
         simulations = (
             (assets.motions[name], Trajectory.load(run.path / file).positions) for name, file in files.items()
         )

@@ -61,7 +61,7 @@ def training(name: str, *motions: str, steps: int, key: str = "0", device: str =
     simulated = name in TRAININGS and TRAININGS[name].simulated
     return NetworkTraining(
         network=Network(name, 0, "tshirt"), steps=steps, motions=motions, device=device,
-        inputs={"key": key}, key=key, simulated={m: ("data", m) for m in motions if simulated},
+        inputs={"key": key}, key=key, reads=tuple(("data", m) for m in motions if simulated),
     )  # fmt: skip
 
 

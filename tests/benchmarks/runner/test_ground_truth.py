@@ -54,7 +54,7 @@ def still(clip, entry) -> Trajectory:
 def whole(folder, name: str) -> Outcome:
     """Return the outcome of a simulation of 90 frames, whose file is there."""
     still(dataclasses.replace(MOTION, name="still_1"), None).save(folder / f"{name}.vtkhdf")
-    return Outcome(result={"whole": True}, files=(f"{name}.vtkhdf",))
+    return Outcome(result={"whole": True, "motion": name}, files=(f"{name}.vtkhdf",))
 
 
 @pytest.fixture
@@ -119,7 +119,8 @@ def test_a_network_learns_from_given_motions_and_from_the_clips_that_are_there(t
     assets = assets_of(tube_dress(), MOTION)
     clips = {("clips", str(part)): clips_of(part, tmp_path, assets) for part in range(2)}
     done = whole(tmp_path, MOTION.name)
-    task = dataclasses.replace(training("supervised", MOTION.name, steps=1), clips=tuple(clips))
+    task = training("supervised", MOTION.name, steps=1)
+    task = dataclasses.replace(task, reads=(*task.reads, *clips))
     result = train(task, context(tmp_path, assets), {("data", MOTION.name): done, **clips}).result
     assert result["frames"] == 90 + 2 * CLIP_FRAMES
     assert result["clips_left_out"] == 1 and result["left_out"] == []
@@ -139,8 +140,8 @@ def test_the_same_simulations_serve_every_seed_and_training(tmp_path, monkeypatc
     labels = [task.label for task in tasks]
     assert len(labels) == len(set(labels)) == len({task.id for task in tasks}) == 1 + 2 + 3 + 2 + 2
     assert "tshirt/walk" in labels and "tshirt/walk by fast-lbfgs-10" in labels
-    clips = Schedule(plan).training(Network("tailornet", 0, "tshirt")).clips
-    assert clips == tuple(("clips", f"tshirt-mixed-2/fast-lbfgs-10-{part}") for part in (0, 1))
+    *_, first, second = Schedule(plan).training(Network("tailornet", 0, "tshirt")).reads
+    assert [first, second] == [("clips", f"tshirt-mixed-2/fast-lbfgs-10-{part}") for part in (0, 1)]
 
 
 def test_a_training_of_equal_data_has_the_steps_and_clips_that_it_declares(tmp_path):
@@ -150,7 +151,8 @@ def test_a_training_of_equal_data_has_the_steps_and_clips_that_it_declares(tmp_p
     tasks = {network.name: Schedule(plan).training(network) for network in plan.networks}
     for entry in entries:
         task, training = tasks[entry.trained], entry.training
-        assert len(task.clips) == (training.simulated.mixed if training.simulated else 0)
+        mixed = training.simulated.mixed if training.simulated else 0
+        assert sum(kind == "clips" for kind, _ in task.reads) == mixed
         assert task.motions == ("walk", "run")
         assert task.steps == plan.preset.steps["snug"] * (LONGEST if training.converged else 1)
         assert task.held_out == (("bow",) if training.converged else ())
@@ -164,7 +166,7 @@ def test_a_training_goes_on_until_held_out_motions_get_no_better(tmp_path, monke
     task = dataclasses.replace(
         training("supervised", "given", steps=200), held_out=("held",),
         network=Network(entry.trained, 0, "tshirt", entry.training),
-        simulated={id[1]: id for id in needed},
+        reads=tuple(needed),
     )  # fmt: skip
     values = iter([5.0, 3.0, *[4.0] * 200])
     monkeypatch.setattr("snug.training.validation.Validator.value", lambda self: next(values))
