@@ -12,6 +12,9 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks import run as benchmarks_run
+from tests.benchmarks.runner.tasks_by_hand import run_in_this_process
+
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *ROOT.glob("studies/*/*.md")])
 EXTEND, EXAMPLES = ROOT / "docs" / "extend.md", ROOT / "docs" / "examples"
@@ -19,7 +22,7 @@ FILE = re.compile(r"File `([^`]+)`:$")
 # As written they are run by -m slow; in one run by TOGETHER.
 JOINED = ("A method", "A scene", "A metric")
 TOGETHER = (
-    "python -m benchmarks.run smoke --scenes hanging_sheet,./curtain.py"
+    "smoke --scenes hanging_sheet,./curtain.py"
     " --methods simulation,newton-1,./held.py,./explicit.py --set metrics=./height.py -o "
 )
 WITHOUT_RESULTS = ("How to add something", "An energy")
@@ -102,20 +105,22 @@ def test_an_example_of_extending_runs_as_written(title, user, tmp_path):
         judge(title, tmp_path)
 
 
-def test_a_method_a_scene_and_a_metric_of_the_examples_run_together(user, tmp_path):
-    run(user, TOGETHER + str(tmp_path))
+def test_a_method_a_scene_and_a_metric_of_the_examples_run_together(user, tmp_path, monkeypatch):
+    run_in_this_process(monkeypatch)
+    monkeypatch.chdir(user)
+    assert benchmarks_run.main([*TOGETHER.split(), str(tmp_path)]) == 0
     for title in JOINED:
         judge(title, tmp_path)
 
 
-def test_the_lines_of_python_in_the_readme_run(tmp_path):
+def test_the_lines_of_python_in_the_readme_run(tmp_path, monkeypatch):
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     (code,) = [text for _, language, text in blocks(readme) if language == "python"]
     for whole, part in (("cells=20", "cells=4"), ("pins=[0, 20]", "pins=[0, 4]"), ("frames=60", "frames=3")):
         assert whole in code
         code = code.replace(whole, part)
-    (tmp_path / "lines.py").write_text(code, encoding="utf-8")
-    run(tmp_path, "python lines.py")
+    monkeypatch.chdir(tmp_path)
+    exec(code, {"__name__": "__main__"})
 
 
 def heading_anchors(path: Path) -> set[str]:

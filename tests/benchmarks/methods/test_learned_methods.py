@@ -31,15 +31,15 @@ def test_a_training_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
 
         done.clear()
         monkeypatch.setattr(Trainer, "step", counted)
-        return train(training("snug", motion.name, steps=12, key=key), context(folder, assets), {})
+        return train(training("snug", motion.name, steps=5, key=key), context(folder, assets), {})
 
     models = RunFolder(tmp_path).models
     for key in ("before", "now"):  # the first is another training: of other inputs, or of other code
         with pytest.raises(KeyboardInterrupt):
-            trained(tmp_path, key, 8)
-        assert done == list(range(8))
+            trained(tmp_path, key, 3)
+        assert done == list(range(3))
         assert [path.name for path in models.iterdir()] == [CHECKPOINT]
-    assert trained(tmp_path, "now").result["steps"] == 12 and done == [8, 9, 10, 11]
+    assert trained(tmp_path, "now").result["steps"] == 5 and done == [3, 4]
     (tmp_path / "damaged" / "models").mkdir(parents=True)
     (tmp_path / "damaged" / "models" / CHECKPOINT).write_bytes(b"half")
     trained(tmp_path / "damaged", "now")

@@ -51,22 +51,23 @@ def project(tmp_path):
     return tmp_path
 
 
-def test_an_edit_in_another_file_that_changes_the_result_is_seen_and_the_kernel_before_it_stays(project):
-    assert call(project)[:2] == (655, False)
-    assert call(project)[:2] == (655, True)
-    for name, old, new, value in (
+@pytest.mark.parametrize(
+    ("name", "old", "new", "value"),
+    [
         ("deep.py", "x + 1", "x + 2", 1015),
-        ("other.py", "x**2", "x**3", 10015),
-        ("constants.py", "10", "20", 20015),
-        ("term.py", "data[0] * x", "data[0] + x", 20011),
-        ("constants.py", "20", "10", 10011),
-    ):
-        source = (project / name).read_text()
-        assert old in source
-        (project / name).write_text(source.replace(old, new))
-        assert call(project)[:2] == (value, False), name
-    (project / "term.py").write_text(HEAD + FILES["term.py"])
-    assert call(project)[:2] == (10015, True)
+        pytest.param("other.py", "x**2", "x**3", 5135, marks=pytest.mark.slow),
+        pytest.param("constants.py", "10", "20", 1295, marks=pytest.mark.slow),
+        pytest.param("term.py", "data[0] * x", "data[0] + x", 651, marks=pytest.mark.slow),
+    ],
+)
+def test_an_edit_in_another_file_is_seen_and_the_kernel_before_it_stays(name, old, new, value, project):
+    assert call(project)[:2] == (655, False)
+    source = (project / name).read_text()
+    assert old in source
+    (project / name).write_text(source.replace(old, new))
+    assert call(project)[:2] == (value, False)
+    (project / name).write_text(source)
+    assert call(project)[:2] == (655, True)
 
 
 def test_where_the_package_cannot_be_written_the_cache_of_the_user_serves(project):

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from snug.body.parametric_body import Body
 from snug.garments.garment import GarmentError
 from snug.garments.templates import GARMENT_TEMPLATES, find_template
 from tests.reference_sim.meshes import edge_counts, girth
@@ -13,17 +14,24 @@ from tests.snug.body.other_bodies import child, other_mesh, simulate_walk
 KINDS = [pattern.name for pattern in GARMENT_TEMPLATES]
 
 
+class Wardrobe(dict):
+    """Every sort of garment, at 600 vertices, tailored when it is asked for."""
+
+    def __missing__(self, kind):
+        self[kind] = find_template(kind).tailor(Body.load(), vertices=600)
+        return self[kind]
+
+
 @pytest.fixture(scope="session")
-def wardrobe(body):
-    """Every sort of garment, at 600 vertices."""
-    return {kind: find_template(kind).tailor(body, vertices=600) for kind in KINDS}
+def wardrobe():
+    return Wardrobe()
 
 
-@pytest.fixture(params=[*KINDS, 300, pytest.param(4400, marks=pytest.mark.slow)])
+@pytest.fixture(params=[*KINDS, *(pytest.param(size, marks=pytest.mark.slow) for size in (300, 4400))])
 def garment(request, wardrobe, body):
     """Every sort, the T-shirt of other sizes too."""
     size = request.param
-    return wardrobe.get(size) or find_template("tshirt").tailor(body, vertices=size)
+    return wardrobe[size] if size in KINDS else find_template("tshirt").tailor(body, vertices=size)
 
 
 @pytest.fixture(params=["tshirt", "tunic"])
