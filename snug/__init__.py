@@ -1,16 +1,6 @@
 """Neural garments: bodies, garments, motions, networks and their training.
 
-| room | what lies there |
-| --- | --- |
-| body, motion, garments | the parametric body, its motions, the garments it wears |
-| recipe, named_recipes, kinds | options of network and training, named sets of them, kinds of networks |
-| kernels | compiled closed forms that training and roll-outs run on a CPU |
-| networks | architectures, their inputs, trained models in files, roll-outs |
-| training | losses, one optimisation step, the loop over steps, checkpoints |
-| train, check | the commands `python -m snug.train` and `python -m snug.check` |
-
-Imports run downwards: body < motion < garments < recipes < kernels < networks < training < train. The
-function that trains is `train_network`; `snug.train` is the command.
+The function that trains is `train_network`; `snug.train` is the command.
 
 A small top of the chest's own skin, a static network trained for two steps, and its roll-out:
 

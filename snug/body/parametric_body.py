@@ -98,15 +98,9 @@ class Body:
     def vertices(
         self, poses: ArrayLike, translations: ArrayLike, betas: ArrayLike | None = None
     ) -> NDArray[np.float64]:
-        """Pose and skin the body.
+        """Return the vertices (T, B, 3) [m] of the body of shape `betas` (S,) in poses (T, 24, 3) [rad].
 
-        Args:
-            poses: (T, 24, 3) [rad], axis-angle relative to the parent joint.
-            translations: (T, 3) [m], added to the skinned vertices.
-            betas: (S,) shape coefficients, by default those of the mean shape.
-
-        Returns:
-            Posed vertices (T, B, 3) [m].
+        The translations (T, 3) [m] are added to the skinned vertices.
 
         Raises:
             BodyError: another shape of an argument, or a number that is not finite.

@@ -13,19 +13,12 @@ from torch import Tensor
 def joint_transforms(
     rotations: Tensor, joints: Tensor, parents: Sequence[int], translations: Tensor
 ) -> Tensor:
-    """Compute the rigid transforms that take points of each joint from the rest pose to the posed body.
+    """Return the rigid transforms (..., J, 3, 4) that take points of each joint from rest to the posed body.
 
-    With world rotation W_j = W_parent R_j and posed joint q_j = q_parent + W_parent (p_j - p_parent), the
-    transform is x -> W_j (x - p_j) + q_j. The root is at q_0 = p_0 + translation.
-
-    Args:
-        rotations: (..., J, 3, 3), relative to the parent joint.
-        joints: (..., J, 3) [m], rest positions.
-        parents: J indices, -1 for a root, every parent before its children.
-        translations: (..., 3) [m].
-
-    Returns:
-        (..., J, 3, 4): rotation and translation side by side.
+    With rotations R_j (..., J, 3, 3) relative to the parent and rest joints p_j (..., J, 3) [m], the world
+    rotation is W_j = W_parent R_j, the posed joint q_j = q_parent + W_parent (p_j - p_parent), and the
+    transform x -> W_j (x - p_j) + q_j. The root is at q_0 = p_0 + translation (..., 3) [m]; its parent is -1,
+    and parents come before their children.
 
     >>> rest = torch.zeros(1, 3)
     >>> joint_transforms(torch.eye(3)[None], rest, [-1], torch.tensor([0.0, 0.0, 1.0]))[0, :, 3]
@@ -64,15 +57,9 @@ def add_pose_correctives(
 
 
 def skin(points: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
-    """Pose points by linear blend skinning, x_i = sum_j w_ij T_j p_i.
+    """Pose points (..., V, 3) [m] by linear blend skinning, x_i = sum_j w_ij T_j p_i.
 
-    Args:
-        points: (..., V, 3) [m] in the rest pose.
-        weights: (V, J), rows sum to one.
-        transforms: (..., J, 3, 4) of the joints, see `joint_transforms`.
-
-    Returns:
-        Posed points (..., V, 3) [m].
+    weights: (V, J), rows sum to one. transforms: (..., J, 3, 4) of `joint_transforms`.
 
     >>> lift = torch.cat([torch.eye(3), torch.tensor([[0.0], [1.0], [0.0]])], dim=1)[None]
     >>> skin(torch.zeros(2, 3), torch.ones(2, 1), lift)
@@ -94,17 +81,8 @@ def unskin_damped(posed: Tensor, rest: Tensor, weights: Tensor, transforms: Tens
     """Return the offsets o of `rest` that minimise |skin(rest + o) - posed|^2 + damping |o|^2 at each vertex.
 
     Where joints turned far from each other blend to a map that is nearly singular, as in an armpit, what
-    `unskin` returns may lie metres away, and means nothing in any other pose.
-
-    Args:
-        posed: (..., V, 3) [m].
-        rest: unposed garment (V, 3) [m].
-        weights: (V, J).
-        transforms: (..., J, 3, 4).
-        damping: beside 1, the square of the stretch of a rotation.
-
-    Returns:
-        Offsets (..., V, 3) [m].
+    `unskin` returns may lie metres away, and means nothing in any other pose. The damping is to be seen
+    beside 1, the square of the stretch of a rotation. Shapes as in `skin`; rest (V, 3) [m].
 
     >>> shift = torch.cat([torch.eye(3), torch.tensor([[0.0], [1.0], [0.0]])], dim=1)[None]
     >>> unskin_damped(torch.tensor([[1.0, 1.0, 0.0]]), torch.zeros(1, 3), torch.ones(1, 1), shift, 1.0)

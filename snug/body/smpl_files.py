@@ -49,10 +49,7 @@ Arrays = dict[str, np.ndarray]
 
 
 def read_body(path: str | Path | None) -> Body:
-    """Read and check a user's body.
-
-    Args:
-        path: .npz or .pkl in SMPL's layout, see the table above; None for the body of the package.
+    """Read and check a user's body, an .npz or .pkl of the table above; None is the body of the package.
 
     Raises:
         BodyError: file, array, remedy.

@@ -86,14 +86,7 @@ class Garment:
     def pin_positions(
         self, body: Body, poses: Array, translations: Array, betas: ArrayLike | None = None
     ) -> Array:
-        """Return the positions (T,P,3) [m] of the pins on the posed body.
-
-        Args:
-            body: that wears the garment.
-            poses: (T,24,3) [rad].
-            translations: (T,3) [m].
-            betas: shape coefficients of the body.
-        """
+        """Return the positions (T,P,3) [m] of the pins on the posed body, see `Body.vertices`."""
         if not len(self.pins):
             return np.empty((len(poses), 0, 3))
         transforms = body.transforms(poses, translations, betas)
@@ -138,19 +131,11 @@ BELOW_HIPS = 0.1  # [m] below the hip joints, from where one tube around both le
 
 
 def find_weights(body: Body, positions: Array, faces: Index, *, legs: bool) -> tuple[Array, Index]:
-    """Find the skinning weights of a garment on the unposed body.
+    """Return skinning weights (V,24) of a garment on the unposed body, and its nearest vertices (V,).
 
     They are blended from the three corners of the closest face of the skin, among the limbs that the garment
-    encloses. One tube around both legs is smoothed below the hips as a skirt is.
-
-    Args:
-        body: that the garment was made for.
-        positions: (V,3) [m].
-        faces: (F,3), wound outward.
-        legs: whether each leg has its own opening.
-
-    Returns:
-        Weights (V,24), and nearest vertices of the body (V,).
+    encloses. One tube around both legs, where neither leg has its own opening (`legs`), is smoothed below the
+    hips as a skirt is.
     """
     followed = skin_following(body, enclosed_limbs(body, positions, faces))
     skin = np.asarray(body.faces)[followed[body.faces].all(axis=1)]
@@ -256,12 +241,7 @@ def piece_of_faces(faces: Index) -> Index:
 def open_seam(positions: Array, faces: Index) -> tuple[Index, float]:
     """Return the boundary vertices (n,) at which a seam was left open, and its largest gap [m].
 
-    They lie within `OPEN_SEAM` mean boundary edges of a boundary vertex that no edge joins them with. Without
-    such a seam both are empty.
-
-    Args:
-        positions: (V,3) [m].
-        faces: (F,3).
+    They lie within `OPEN_SEAM` mean boundary edges of a boundary vertex that no edge joins them with.
     """
     edges, uses = edge_uses(faces)
     rim = edges[uses == 1]

@@ -150,14 +150,9 @@ def _place_rim(points: Array, loop: Index, outline: list[Array]) -> None:
 def remesh(
     points: Array, faces: Index, outlines: list[list[Array]], count: int, surface: ImplicitSurface
 ) -> tuple[Array, Index]:
-    """Remesh a sheet whose boundary loops are the `outlines` evenly, with about `count` vertices.
+    """Remesh a dense sheet (N,3) [m], (M,3) evenly, with about `count` vertices that stay on the surface.
 
-    Args:
-        points: (N,3) [m] of the dense sheet.
-        faces: (M,3).
-        outlines: per loop its curves (P,3) end to end along the winding; one curve alone is closed.
-        count: number of vertices.
-        surface: that the vertices stay on.
+    outlines: of each boundary loop its curves (P,3) end to end along the winding; one curve alone is closed.
 
     Raises:
         ValueError: the clusters are too coarse to keep the sheet's topology.

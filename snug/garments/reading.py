@@ -49,11 +49,7 @@ AREAL_DENSITIES = 0.005, 5.0  # [kg/m^2], lightest and heaviest cloth: beyond th
 
 
 def read_garment(file: GarmentFile | str | Path, body: Body) -> Garment:
-    r"""Read and check a garment that was made for the unposed body.
-
-    Args:
-        file: a mesh file, or such a file with its units, axis, rest shape and material.
-        body: in T pose, for which the garment was made.
+    r"""Read and check a garment that was made for the unposed body, in T pose.
 
     Raises:
         GarmentError: file, problem, remedy.

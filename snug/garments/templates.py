@@ -64,20 +64,19 @@ class GarmentTemplate:
     ranges: Mapping[str, tuple[float, float, str]] = field(default_factory=dict)
 
     def tailor(self, body: Body, *, vertices: int = 1000, **measures: float) -> Garment:
-        """Tailor this kind of garment to the unposed body, mirror-symmetric.
+        """Tailor this kind of garment to the unposed body in T pose, mirror-symmetric.
 
         A waistband, of skirt, trousers and shorts, is carried by the body.
 
         Args:
-            body: in T pose.
+            body: that wears it.
             vertices: number of vertices, met within 1 %.
             measures: in place of defaults, of those that the kind has:
                 ease: girth [m] beyond a garment that lies at `clearance`: of a shirt or dress at the waist
                 and cuffs, of a skirt at the hips, of trousers and shorts at hips and legs;
                 clearance: least distance [m] from the skin, over vertices, edge midpoints and centroids;
                 sleeve: covered share of the upper arm, or of the whole arm for long sleeves;
-                strap: width of the straps [m];
-                rise: waistband above the hip joints [m];
+                strap: width of the straps [m]; rise: waistband above the hip joints [m];
                 length: hem below the hip joints [m]; of trousers and shorts the inseam, as a share of that
                 from crotch to ankle;
                 flare: how much further [m] the hem stands off than the waist, or a skirt's than the hips.

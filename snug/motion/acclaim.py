@@ -36,21 +36,13 @@ JOINT_BONES = {
 
 @dataclass
 class Bone:
-    """A bone of the skeleton; one named "root" is the root.
+    """A bone of the skeleton; one named "root" is the root."""
 
-    Attributes:
-        direction: (3,) unit, in the zero pose.
-        length: [m].
-        axes: (3, 3), C.
-        channels: in the file's order.
-        parent: name of the bone that it hangs on.
-    """
-
-    direction: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    length: float = 0.0
-    axes: np.ndarray = field(default_factory=lambda: np.eye(3))
-    channels: tuple[str, ...] = ()
-    parent: str = ""
+    direction: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) unit, in the zero pose
+    length: float = 0.0  # [m]
+    axes: np.ndarray = field(default_factory=lambda: np.eye(3))  # (3, 3), C
+    channels: tuple[str, ...] = ()  # in the file's order
+    parent: str = ""  # name of the bone that it hangs on
 
 
 def read_asf_amc(path: Path, options: MotionFileOptions) -> Motion:
@@ -109,13 +101,10 @@ def product(channels: Sequence[str], values: np.ndarray) -> np.ndarray:
 
 
 def read_asf(path: Path) -> tuple[dict[str, Bone], float]:
-    """Parse a skeleton as CMU writes them: angles in degrees, axes in the order XYZ, its root at the origin.
-
-    Returns:
-        The bones by name, parents first, and the length [m] of the file's unit.
+    """Parse a skeleton: its bones by name, parents first, and the length [m] of the file's unit.
 
     Raises:
-        MotionError: names the line.
+        MotionError: names the line, and what is not as CMU writes it.
     """
     return parse_lines(path, _parse_bones, comment="#")
 

@@ -25,21 +25,13 @@ CHANNELS = {f"{axis}{kind}".lower(): f"{axis}{kind}" for kind in ("position", "r
 
 @dataclass
 class Joint:
-    """A joint of the hierarchy. An end site is a joint without channels and without a name.
-
-    Attributes:
-        name: in the file.
-        parent: index, -1 for the root.
-        offset: (3,) in the file's unit.
-        channels: "Xposition" and so on, from column `first` of the frames on.
-        first: column.
-    """
+    """A joint of the hierarchy. An end site is a joint without channels and without a name."""
 
     name: str
-    parent: int
-    offset: np.ndarray = field(default_factory=lambda: np.zeros(3))
-    channels: tuple[str, ...] = ()
-    first: int = 0
+    parent: int  # index, -1 for the root
+    offset: np.ndarray = field(default_factory=lambda: np.zeros(3))  # (3,) in the file's unit
+    channels: tuple[str, ...] = ()  # "Xposition" and so on
+    first: int = 0  # column of the frames at which its channels begin
 
 
 def read_bvh(path: Path, options: MotionFileOptions) -> Motion:
@@ -119,10 +111,7 @@ def _standing(at: Mapping[str, np.ndarray]) -> tuple[np.ndarray, float]:
 
 
 def read_clip(path: Path) -> tuple[list[Joint], np.ndarray, float | None]:
-    """Parse a file.
-
-    Returns:
-        Joints, parents first; numbers (T, C) of each frame; frames per second [1/s] where the file states it.
+    """Parse a file: joints, parents first; numbers (T, C) of the frames; the rate [1/s] that it states.
 
     Raises:
         MotionError: names the line of what is damaged or too large.

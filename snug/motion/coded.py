@@ -137,11 +137,8 @@ def gait(stride: Stride, seconds: float, pace: float = 1.0, stop: float | None =
 def gait_motion(stride: Stride, pace: float, size: np.ndarray, added: Mapping[str, np.ndarray]) -> Frames:
     """Return poses and root translations of a gait, at RATE.
 
-    Args:
-        stride: that is repeated.
-        pace: share of the stride's normal rate.
-        size: (T,), 0 standing to 1 the full curves; the pace is in proportion.
-        added: angles by name, (T,) [degrees], on top of those of the stride.
+    pace: share of the stride's normal rate. size: (T,), 0 standing to 1 the full curves; the pace is in
+    proportion. added: angles by name, (T,) [degrees], on top of those of the stride.
     """
     phase = np.cumsum(pace * size) / RATE / stride.seconds
     angles = gait_angles(stride, phase, size)

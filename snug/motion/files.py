@@ -125,10 +125,6 @@ def load_motions(path: str | Path, *, options: MotionFileOptions | None = None) 
     spread by `clear_arms` and the hands' rotations at a tenth. CMU files (.amc) need their skeleton (.asf)
     beside them. Of a folder, a subject's shape as AMASS keeps it beside the clips (SHAPE_FILES) is left out.
 
-    Args:
-        path: a file of a kind in `READERS`, or a folder of them.
-        options: facts that the files do not state.
-
     Raises:
         MotionError: one line with file, element and remedy, for anything that cannot be read.
 

@@ -109,9 +109,6 @@ def make_motion(name: str) -> Motion:
 
     A segment of a recorded clip is turned and moved to begin above the origin, facing +z.
 
-    Args:
-        name: one of LIBRARY.
-
     Raises:
         MotionError: a name that is not in LIBRARY.
 

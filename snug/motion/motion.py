@@ -157,17 +157,9 @@ def resample(motion: Motion, fps: float = 30.0) -> Motion:
 
 
 def transition(pose_a: np.ndarray, pose_b: np.ndarray, frames: int) -> np.ndarray:
-    """Make the frames from one pose to another, both ends included, at rest at both.
+    """Make the frames (frames, 24, 3) [rad] from one pose (24, 3) to another, both included, at rest at both.
 
     Each joint turns along the shortest arc with the minimum-jerk timing 10 s^3 - 15 s^4 + 6 s^5.
-
-    Args:
-        pose_a: (24, 3) [rad], the first frame.
-        pose_b: (24, 3) [rad], the last frame.
-        frames: number of frames.
-
-    Returns:
-        Poses (frames, 24, 3) [rad].
 
     Source:
         T. Flash and N. Hogan, The coordination of arm movements, Journal of Neuroscience 5 (1985).
@@ -266,18 +258,12 @@ def _up_and_turns(poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def arm_clearance(motion: Motion) -> np.ndarray:
-    """Return the angles (T, 2) [rad] between the left and right upper arm and the downward spine.
-
-    Small when the arm lies on the torso.
-    """
+    """Return the angles (T, 2) [rad] between each upper arm and the downward spine: small on the torso."""
     return _limb_angles(motion, ("shoulder", "elbow"), ("spine3", "spine1"))
 
 
 def lap_clearance(motion: Motion) -> np.ndarray:
-    """Return the angles (T, 2) [rad] between the left and right thigh and the upward spine.
-
-    Small when the thigh lies on the belly.
-    """
+    """Return the angles (T, 2) [rad] between each thigh and the upward spine: small on the belly."""
     return _limb_angles(motion, ("hip", "knee"), ("spine1", "spine3"))
 
 

@@ -118,11 +118,7 @@ def turn_y_up(motion: Motion, up: str) -> Motion:
 
     In a frame the body stands along the axis that is nearest to the direction from its ankles to its head.
     The axis of more than half of the frames is taken; a body that lies in the others, as after a fall, is
-    fine.
-
-    Args:
-        motion: in the axes of its file.
-        up: its vertical axis, "y" or "z"; empty: the one along which the body stands.
+    fine. A given axis `up`, "y" or "z", is taken if the body stands along it.
 
     Raises:
         MotionError: no axis is that, the given one is not, or a body that should stand along the axis found

@@ -129,9 +129,7 @@ _BREAKS = re.compile(r"[\s_.\-]+|(?<=[a-z])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
 def match_joints(names: Sequence[str], parents: Sequence[int]) -> dict[str, int]:
     """Return our joint names with the indices of their joints; optional ones that they lack are left out.
 
-    Args:
-        names: of their joints, empty for end sites.
-        parents: indices, -1 for the root, parents first.
+    End sites have an empty name. Parents come first, that of the root is -1.
 
     Raises:
         MotionError: a needed joint is missing; names it.
