@@ -58,24 +58,21 @@ class Runner:
 
     def _side_by_side(self, tasks: Sequence[Task], executor: Executor) -> None:
         """Do tasks, each as soon as its needs have outcomes."""
-        for task in tasks:
-            if self._is_ready([task]):
-                self.decide(task)
-        waiting = _batches([task for task in tasks if task.id not in self.outcomes])
-
-        def ready() -> Batch | None:
-            for batch in filter(self._is_ready, list(waiting)):
-                waiting.remove(batch)
-                if wanted := [task for task in batch if self.decide(task)]:
-                    return wanted, self._needed(*wanted)
-            return None
-
+        waiting = _batches(tasks)
         with _bar(tasks) as bar:
-            bar.update(len(tasks) - sum(map(len, waiting)))
+
+            def ready() -> Batch | None:
+                for batch in filter(self._is_ready, list(waiting)):
+                    waiting.remove(batch)
+                    wanted = [task for task in batch if self.decide(task)]
+                    bar.update(len(batch) - len(wanted))
+                    if wanted:
+                        return wanted, self._needed(*wanted)
+                return None
+
             for task, outcome in executor.together(ready):
                 self._keep(task, outcome)
                 bar.update()
-            bar.update(bar.total - bar.n)
 
     def _is_ready(self, batch: Sequence[Task]) -> bool:
         """Return whether every dependency of the batch has an outcome."""
@@ -98,8 +95,6 @@ class Runner:
 
         Files of an earlier run of it are removed then, so that nobody takes them for this one's.
         """
-        if task.id in self.outcomes:
-            return False
         _, outcome = self._find(task)
         if outcome is None:
             for name in task.files:
