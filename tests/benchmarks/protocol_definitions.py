@@ -7,10 +7,10 @@ digests; test_protocol.py compares them with the code.
 
 from __future__ import annotations
 
-import inspect
 from collections.abc import Callable, Iterator
 from dataclasses import asdict, replace
-from typing import TYPE_CHECKING, Any
+from inspect import signature
+from typing import Any
 
 import numpy as np
 
@@ -19,9 +19,6 @@ from benchmarks.results import protocol as recorded
 from benchmarks.results.protocol import LEAST_MEMBERS, MEMBERS
 from benchmarks.scenes import GARMENT_SCENES, SCENES, all_scenes
 from reference_sim.minimise.newton import Newton
-
-if TYPE_CHECKING:
-    from snug.garments.templates import GarmentTemplate
 
 PRESET = "quick"  # whose sizes the meshes of the digest have
 DECIMALS = 6  # [um, urad] of arrays: more may differ between processors
@@ -40,6 +37,7 @@ def _scenes() -> dict[str, Any]:
     from snug.motion.library import DYNAMIC_TEST, DYNAMIC_VALIDATION, TEST, VALIDATION
     from snug.training.simulated_data import settings_of
 
+    templates = {worn.garment: find_template(worn.garment) for worn in GARMENT_SCENES}
     preset = find_preset(PRESET)
     body = Body.load()
     declared = all_scenes((*TEST, *VALIDATION), (*DYNAMIC_TEST, *DYNAMIC_VALIDATION))
@@ -50,7 +48,10 @@ def _scenes() -> dict[str, Any]:
             for name, scene in declared.items()
         },
         "worn": settings_of(body, find_template("tshirt").tailor(body, vertices=preset.garment_vertices)),
-        "garments": {worn.garment: _defaults(find_template(worn.garment)) for worn in GARMENT_SCENES},
+        "garments": {
+            name: {"vertices": signature(made.tailor).parameters["vertices"].default, **made.measures}
+            for name, made in templates.items()
+        },
         "built": {
             name: (
                 _rounded(scene.cloth.rest_positions), scene.cloth.faces, scene.terms, scene.dt, scene.frames,
@@ -60,12 +61,6 @@ def _scenes() -> dict[str, Any]:
         },
         "energies": {name: list(_probed(built[name])) for name in PROBED},
     }  # fmt: skip
-
-
-def _defaults(template: GarmentTemplate) -> dict[str, Any]:
-    """Return the number of vertices and the measures of a garment that is tailored without any given."""
-    vertices = inspect.signature(template.tailor).parameters["vertices"].default
-    return {"vertices": vertices, **template.measures}
 
 
 def _rounded(array: np.ndarray) -> np.ndarray:
