@@ -104,7 +104,7 @@ def test_run_time_is_from_pose_to_vertices_where_every_timed_cell_has_that(tmp_p
     frame_times = [r for r in rows if r.metric == "cost/frame"]
     whole = [dataclasses.replace(r, metric="cost/whole", value=r.value + 2.0) for r in frame_times]
     rows.append(row(SCENES[0], "skinning", "cost/spread", 50.0, "%"))
-    for added, shift in ((whole, 2.0), (whole[1:], 0.0), ([], 0.0)):
+    for added, shift in ((whole, 2.0), (whole[1:], 0.0)):
         run = run_of([*rows, *added])
         cells = run.cells("speed")
         scene = cells[cells["scene"] == SCENES[0]]
@@ -115,7 +115,6 @@ def test_run_time_is_from_pose_to_vertices_where_every_timed_cell_has_that(tmp_p
         )
         assert point.time == pytest.approx(0.1 + shift) and point.time_spread == pytest.approx(0.05)
         assert run_time(scene) == ("cost/whole" if shift else "cost/frame")
-        assert list(error_of_page_one(run))
 
 
 def test_a_caption_speaks_of_a_grey_band_only_where_one_is_seen():

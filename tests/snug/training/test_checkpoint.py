@@ -1,6 +1,7 @@
 """A run that was stopped at any moment, and resumed, ends with the bits of an unbroken one."""
 
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -116,6 +117,20 @@ def test_command_resumes_what_was_interrupted(tmp_path, monkeypatch, capsys):
     assert train.main(arguments) == 0 and "nothing to resume" in capsys.readouterr().out
 
 
+@pytest.fixture(scope="module")
+def left(tmp_path_factory):
+    """The checkpoint of a training of a kind that was interrupted after a step."""
+
+    @cache
+    def interrupted(kind):
+        path = tmp_path_factory.mktemp(kind) / "run.safetensors"
+        checkpoint = Checkpoint(path=path, minutes=EVERY_STEP, resume=True)
+        stopped(short, kind, checkpoint=checkpoint, after=1)
+        return checkpoint
+
+    return interrupted
+
+
 DRESSED = tube_dress()
 STIFF = replace(DRESSED.garment, material=Material(young_modulus=1e6))
 
@@ -130,9 +145,8 @@ STIFF = replace(DRESSED.garment, material=Material(young_modulus=1e6))
         ("snug", {}, (checkpoints, "CHECKPOINT_FORMAT", "snug-checkpoint-99"), "no checkpoint of this vers"),
     ],
 )
-def test_a_checkpoint_of_another_run_is_refused(kind, then, now, message, tmp_path, monkeypatch):
-    checkpoint = Checkpoint(path=tmp_path / "run.safetensors", minutes=EVERY_STEP, resume=True)
-    stopped(short, kind, checkpoint=checkpoint, after=1)
+def test_a_checkpoint_of_another_run_is_refused(kind, then, now, message, left, monkeypatch):
+    checkpoint = left(kind)
     if now:
         monkeypatch.setattr(*now)
     with pytest.raises(TensorFileError, match=message):
