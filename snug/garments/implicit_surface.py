@@ -213,19 +213,10 @@ def build_surface(
     body: Body, *, hem: float, top: float, ease: float, clearance: float, cuff: float | None = None,
     flare: float = 0.0, waistband: bool = False, legs: bool = False,
 ) -> ImplicitSurface:  # fmt: skip
-    """Build the surface of a garment between two heights.
+    """Build the surface of a garment between the heights hem and top [m].
 
-    Args:
-        body: that wears it.
-        hem: lower height [m].
-        top: upper height [m].
-        ease: girth [m] added to waist and sleeves beyond a shirt that lies `clearance` off the skin, or, with
-            a waistband, to hips and legs.
-        clearance: [m] off the skin.
-        cuff: x [m] where sleeves end, None without sleeves.
-        flare: how much further [m] the hem stands off than waist or hips, all around.
-        waistband: whether it hangs from the hips instead of the shoulders.
-        legs: whether it is a pair of trousers.
+    Ease, clearance and flare [m] are those of `GarmentTemplate.tailor`. Sleeves end at x = cuff [m]. With a
+    waistband it hangs from the hips instead of the shoulders, with legs it is a pair of trousers.
     """
     import igl  # not loaded where garments are only named
 

@@ -271,11 +271,7 @@ def turning_walk(degrees: float, hertz: float, pace: float, stop: float) -> Fram
 Made = tuple[str, str, Callable[[], Frames]]  # kind, source, function
 
 
-def _actions() -> dict[str, Made]:
-    tables = tomllib.loads(Path(__file__).with_name("actions.toml").read_text(encoding="utf-8"))
-    return {name: (table.pop("kind"), "key angles", partial(act, **table)) for name, table in tables.items()}
-
-
+ACTIONS_FILE = Path(__file__).with_name("actions.toml")
 # Signs, phases and amplitudes differ.
 STOPS: dict[str, Callable[[], Frames]] = {
     "twist_1": partial(twist, -30.0, 0.7, 0.33, 1.6),
@@ -296,7 +292,10 @@ STOPS: dict[str, Callable[[], Frames]] = {
 }
 CURVES = "normative gait curves"
 MADE: dict[str, Made] = {
-    **_actions(),
+    **{
+        name: (table.pop("kind"), "key angles", partial(act, **table))
+        for name, table in tomllib.loads(ACTIONS_FILE.read_text(encoding="utf-8")).items()
+    },
     "walk": ("walk", CURVES, partial(gait, WALK, 4.0)),
     "brisk_walk": ("walk", CURVES, partial(gait, WALK, 3.0, pace=1.25)),
     "run": ("run", CURVES, partial(gait, RUN, 3.0)),

@@ -100,7 +100,6 @@ CONTROL: tuple[str, ...] = (
     "twist_1", "twist_2", "twist_3", "twist_4", "twist_5", "twist_6", "turntable_1", "turntable_2",
     "turntable_3", "turning_walk_1", "turning_walk_2", "turning_walk_3", "turning_walk_4",
 )  # fmt: skip
-RECORDED_FPS = 30.0  # [1/s]
 LIBRARY = tuple(dict.fromkeys((*TRAIN, *VALIDATION, *TEST, *DYNAMIC_VALIDATION, *CONTROL, *CLIPS)))
 
 
@@ -132,9 +131,8 @@ def make_motion(name: str) -> Motion:
 def _read_clip(name: str) -> Motion:
     with np.load(CLIPS_FILE) as file:  # reads what is asked for
         poses, translations, source = (file[f"{name}/{part}"] for part in ("poses", "translations", "source"))
-    return Motion(
-        name, poses, translations, RECORDED_FPS, CLIPS[name].content, f"CMU motion capture: {source}"
-    )
+    source = f"CMU motion capture: {source}"
+    return Motion(name, poses, translations, kind=CLIPS[name].content, source=source)
 
 
 def _segment(name: str, clip: Motion) -> Motion:

@@ -85,17 +85,16 @@ def root_path(
 
     Height: the lowest sole point is on the floor; in a flight the pelvis follows the parabola of free fall
     between its heights at take-off and landing. Forward and sideways: the sole points that carry the body do
-    not move over the floor; in a flight the speed goes over from one to the other.
+    not move over the floor; in a flight the speed goes over from one to the other. Gaussians smooth both.
 
     Args:
         poses: (T, 24, 3) [rad] at RATE.
         flights: (start, end) [s] of each.
         support: (T, 2) shares in [0, 1] of the left and right foot where they are known (a swinging foot may
             come as low as the standing one); else the lowest points carry.
-        height_smoothing: [s], of a Gaussian over time.
-        speed_smoothing: [s], of a Gaussian over time.
-        rises: the floor is steps: from the first frame on the height, too, is such that the carrying points
-            stay.
+        height_smoothing: [s].
+        speed_smoothing: [s].
+        rises: the floor is steps: the height, too, is such that the carrying points stay.
     """
     soles = sole_points(poses, np.zeros((len(poses), 3)))
     weights = np.exp((soles[..., 1].min(axis=1, keepdims=True) - soles[..., 1]) / CONTACT_DEPTH)

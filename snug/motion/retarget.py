@@ -40,10 +40,8 @@ def retarget(
 ) -> np.ndarray:
     """Return our poses (T, 24, 3) [rad] relative to the parents; a joint that they lack does not turn.
 
-    Args:
-        turns: (T, 3, 3) by our joint, its rotation in the world from their zero pose.
-        directions: (3,) of LIMBS, and of FEET where there are any, in their zero pose, y up, facing +z.
-        hinges: (3,) axes of HINGES in the same pose; empty for a skeleton without.
+    By our joint: `turns` (T, 3, 3) in the world from their zero pose; in that pose, y up and facing +z,
+    `directions` (3,) of LIMBS and of FEET where there are any, and axes (3,) of HINGES or none at all.
 
     Raises:
         MotionError: a limb has no direction, or the zero pose is no T or A pose.

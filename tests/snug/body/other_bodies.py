@@ -5,12 +5,8 @@ import dataclasses
 import igl
 import numpy as np
 
-from benchmarks.assets import Assets, embedded_motions
-from benchmarks.scenes import of_garment
-from reference_sim import Trajectory, simulate
 from snug.body.parametric_body import Body
 from snug.body.skeleton import PARENTS
-from snug.garments.garment import Garment
 
 SMPL_FACES = 13776  # 6890 vertices
 
@@ -96,19 +92,6 @@ def plain_arrays(body: Body) -> dict[str, np.ndarray]:
         "joints": body.joint_template,
         "parents": body.parents,
     }
-
-
-def simulate_walk(garment: Garment, body: Body, frames: int = 30) -> Trajectory:
-    """The garment, settled on the body, in the first frames of a walk."""
-    motion = embedded_motions(["walk"])[0].cut(0, frames)
-    assets = Assets(body, {garment.name: garment}, {motion.name: motion}, {})
-    scene = dataclasses.replace(
-        of_garment(garment.name).scene("walk"), sizes=(), options={"settle_frames": 30, "warm_up_frames": 0}
-    ).build(assets)
-    return simulate(
-        scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, obstacle=scene.obstacle,
-        start=scene.start, velocity=scene.start_velocity, pin_positions=scene.pin_positions,
-    )  # fmt: skip
 
 
 def volume(vertices: np.ndarray, faces: np.ndarray) -> float:
