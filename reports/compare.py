@@ -10,7 +10,7 @@ from collections.abc import Iterator, Sequence
 
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command_line import Parser, command
-from reports.comparison import BETTER, FAILING, GONE, OTHER, TIME_TOLERANCE, WORSE, Comparison, compare
+from reports.comparison import BETTER, FAILING, GONE, OTHER, WORSE, Comparison, compare
 from reports.finished_run import Run, read_run
 
 EXAMPLES = """examples:
@@ -27,7 +27,7 @@ What counts as a change:
   a motion of a garment: so, over its seeds, whose scatter is pooled over all motions; p is corrected for all
            of these tests. Without seeds, beyond three times the uncertainties.
   a time   repeated: all of its interval beyond 15 %, on the same hardware; memory likewise. Taken once:
-           beyond a factor of 2; what lies between is counted and named.
+           beyond a factor of 2; what lies between is counted.
   a check  one that passed fails, or the other way round; so with stress tests, whatever --metrics says.
   a cell   one that came to its end no longer does, or the other way round; likewise.
   a loss   methods, motions, seeds and metrics that A has and B has not.
@@ -67,13 +67,8 @@ def _summary(comparison: Comparison, runs: Sequence[Run]) -> Iterator[str]:
     order = (GONE, WORSE, BETTER, OTHER)
     counts = [f"{sum(c.verdict == v for c in comparison.changes)} {v}" for v in order]
     yield f"{comparison.compared} means compared: {', '.join(counts)}."
-    if count := comparison.one_seed:
-        yield f"Not judged: {count} means differ that have one seed; run both with --seeds 0,1,2."
-    if once := comparison.taken_once:
-        names = ", ".join(f"{method} {count}" for method, count in once.items())
-        yield f"Not judged: times taken once that differ by more than {100 * TIME_TOLERANCE:.0f} %: {names}."
-    if comparison.added:
-        yield f"Not compared: {comparison.added} numbers of B alone."
+    if count := comparison.not_judged:
+        yield f"Not judged: {count} means differ, but have one seed or were timed once."
     machines = [", ".join(sorted(set(run.frame["hardware"]))) for run in runs]
     if machines[0] != machines[1]:
         yield f"No times compared: A ran on {machines[0]}, B on {machines[1]}."

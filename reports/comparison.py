@@ -12,7 +12,6 @@ method without seeds is compared with the uncertainty that the reference's ensem
 from __future__ import annotations
 
 import math
-from collections import Counter
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
@@ -80,7 +79,7 @@ def side(metric: Metric, difference: float) -> str:
     return WORSE if bool(difference > 0.0) is metric.lower_is_better else BETTER
 
 
-def size_of_means(metric: Metric, mean: Mean, new: Mean, far: Effect, p: float | None) -> str:
+def size_of(metric: Metric, mean: Mean, new: Mean, far: Effect, p: float | None) -> str:
     """Return a change as "0.21 ± 0.010 -> 0.26 ± 0.010 J, × 1.24 (1.20 to 1.28), p 0.0030"."""
     before, after = (with_spread(m.value, m.spread_or_uncertainty) for m in (mean, new))
     text = f"{before} -> {after}{_unit(metric)}, {'×' if far.scale == RATIO else 'by'} {number(far.shown)}"
@@ -89,14 +88,8 @@ def size_of_means(metric: Metric, mean: Mean, new: Mean, far: Effect, p: float |
     return text + ("" if p is None else f", p {number(p, 2)}")
 
 
-def size_of_values(metric: Metric, before: float, after: float) -> str:
-    """Return a change as "0.21 -> 0.26 J, × 1.24"."""
-    text = f"{number(before)} -> {number(after)}{_unit(metric)}"
-    return f"{text}, × {number(after / before)}" if before > 0.0 and after > 0.0 else text
-
-
 def _unit(metric: Metric) -> str:
-    return "" if metric.unit in ("", "1") else f" {metric.unit}"
+    return "" if metric.unit == "1" else f" {metric.unit}"
 
 
 def within_tolerance(metric: Metric, mean: Mean, new: Mean, far: Effect, scale: float) -> bool:
@@ -147,7 +140,7 @@ def changed_scenes(one: pd.DataFrame, other: pd.DataFrame, metrics: dict[str, Me
     return [
         Change(
             side(metrics[row.metric], row.far), row.scene, row.method, row.metric,
-            size_of_values(metrics[row.metric], row.before, row.after),
+            f"{number(row.before)} -> {number(row.after)}{_unit(metrics[row.metric])}",
         )
         for row in rows.itertuples()
     ]  # fmt: skip
@@ -287,16 +280,12 @@ class Comparison:
     Attributes:
         changes: what is gone and worse first.
         compared: number of means.
-        one_seed: number of means that differ and cannot be judged, for they have one seed.
-        taken_once: method -> number of its times that differ and cannot be judged, for they were taken once.
-        added: number of values of the later run alone.
+        not_judged: number of means that differ and have one seed, or are times that were taken once.
     """
 
     changes: tuple[Change, ...]
     compared: int
-    one_seed: int
-    taken_once: dict[str, int]
-    added: int
+    not_judged: int
 
 
 def compare(
@@ -327,7 +316,6 @@ def compare(
         of_metrics = [frame[~frame["metric"].isin(machines)] for frame in of_metrics]
     lost = [] if shared else gone(*of_metrics)
     keys = [frame.set_index(CELL).index for frame in of_metrics]
-    added = len(keys[1].difference(keys[0]))
     kept = [frame[key.isin(rest)] for frame, key, rest in zip(of_metrics, keys, reversed(keys))]
     if kept[0].empty:
         raise ResultsError("the two runs share no such scene, method, seed and metric: nothing to compare")
@@ -339,10 +327,10 @@ def compare(
         raise ResultsError(
             f"{place}: of protocol {differ.iloc[0]} in A, {now} in B: another reference or scene"
         )
-    judged, compared, one_seed, once = _means(one, *kept, basis=cells[0])
+    judged, compared, not_judged = _means(one, *kept, basis=cells[0])
     order = (GONE, WORSE, BETTER, OTHER)
     changes = sorted([*lost, *ended, *judged], key=lambda change: order.index(change.verdict))
-    return Comparison(tuple(changes), compared, one_seed, once, added)
+    return Comparison(tuple(changes), compared, not_judged)
 
 
 def _demand_same_scenes(one: Run, other: Run) -> None:
@@ -384,8 +372,8 @@ def _matching(names: pd.Series, patterns: str) -> pd.Series:
 
 def _means(
     run: Run, one: pd.DataFrame, other: pd.DataFrame, *, basis: pd.DataFrame
-) -> tuple[list[Change], int, int, dict[str, int]]:
-    """Return changes, number of means, of those of one seed that differ, and times taken once by method.
+) -> tuple[list[Change], int, int]:
+    """Return changes, number of means, and number of those that differ and cannot be judged.
 
     basis: all rows of the earlier run, whatever methods and metrics are compared.
     """
@@ -401,18 +389,18 @@ def _means(
     ]
     p_values = [far.p_value() for *_, far in judged]
     corrected = iter(holm([p for p in p_values if p is not None]))
-    changes, once = [], Counter[str]()
+    changes, not_judged = [], len(differ) - len(judged)
     for (place, method, metric, mean, new, far), alone in zip(judged, p_values):
         p = None if alone is None else next(corrected)
         if within_tolerance(metric, mean, new, far, float(scales[place, metric.name])):
             continue
         if metric.of == "machine" and mean.uncertainty is None and mean.seeds < 2:
             if far.scale == RATIO and max(far.shown, 1.0 / far.shown) < ONCE:
-                once[method] += 1
+                not_judged += 1
                 continue
         elif not _beyond_noise(metric, far, p):
             continue
-        size = size_of_means(metric, mean, new, far, p)
+        size = size_of(metric, mean, new, far, p)
         changes.append(Change(side(metric, far.value), place, method, metric.name, size))
     reported = {(change.place, change.method, change.metric) for change in changes}
     worn = rows[0][rows[0]["place"] != rows[0]["scene"]]
@@ -420,7 +408,7 @@ def _means(
     before, after = (frame[frame["scene"].isin(garments)] for frame in rows)
     of_scenes = changed_scenes(before, after, known)
     changes += [c for c in of_scenes if (garments[c.place], c.method, c.metric) not in reported]
-    return changes, len(first), len(differ) - len(judged), dict(once)
+    return changes, len(first), not_judged
 
 
 def _with_known_zero(run: Run, *frames: pd.DataFrame, basis: pd.DataFrame) -> list[pd.DataFrame]:

@@ -9,28 +9,19 @@ from functools import lru_cache
 import pandas as pd
 
 from reports.finished_run import Run
-from reports.statistics.means_and_spreads import ensemble_spread, mean_of
-from reports.statistics.outcomes import (
-    BAD,
-    EXTERNAL,
-    LEARNED,
-    counted,
-    leads,
-    subjects,
-)
+from reports.statistics.means_and_spreads import ensemble_spread
+from reports.statistics.outcomes import BAD, EXTERNAL, LEARNED, counted, leads
 from reports.statistics.paper_claims import counts, in_words, judged
-from reports.statistics.pareto import NETWORK, compared_scenes, indistinct, run_time
+from reports.statistics.pareto import indistinct
 from reports.statistics.relative_excess import (
     RELATIVE_EXCESS,
     Excess,
     excess_of,
     with_relative_excess,
 )
-from reports.statistics.verdicts import compare_methods
 from reports.tables.table import in_scenes, listed, number
 
-CURVATURE, DISTANCE, GAP = "curvature/error", "distance/rms", "gap/energy"
-SWING, ALIKE, INSIDE = "dynamics/amplitude", "dynamics/correlation", "penetration/surface"
+CURVATURE, DISTANCE = "curvature/error", "distance/rms"
 
 
 def headline(run: Run) -> list[tuple[str, str]]:
@@ -42,10 +33,7 @@ def headline(run: Run) -> list[tuple[str, str]]:
 @lru_cache(maxsize=4)
 def _measured(run: Run) -> dict[str, str]:
     worn = run.garment_rows[run.garment_rows["garment"] == run.first_garment]
-    return {
-        "How near": nearness(run, worn), "How it moves": _moves(run, worn), "At what cost": _cost(run, worn),
-        "How certain": _certainty(run, worn),
-    }  # fmt: skip
+    return {"How near": nearness(run, worn), "How certain": _certainty(run, worn)}
 
 
 def nearness(run: Run, worn: pd.DataFrame) -> str:
@@ -80,49 +68,6 @@ def _share(excess: Excess) -> str:
     if ends := excess.effect.interval:
         remarks.insert(0, f"95 % interval {' to '.join(number(end, 2) for end in ends)}")
     return f"{number(excess.typical, 2)} % ({'; '.join(remarks)}){excess.fewer}"
-
-
-def _moves(run: Run, worn: pd.DataFrame) -> str:
-    """Say what each subject lacks of the simulation's motion, and how much of it lies inside the body."""
-    sentences = []
-    for method in subjects(run, set(worn[worn["usable"]]["method"])):
-        swing, alike, inside = (mean_of(worn, method, name) for name in (SWING, ALIKE, INSIDE))
-        if swing and alike and inside:
-            sentences.append(
-                f"{run.label(method)} has {secondary_motion(swing.value)} secondary motion: its hem "
-                f"amplitude is {number(100.0 * swing.value, 2)} % of the simulation's{swing.fewer}, with a "
-                f"correlation of {number(alike.value, 2)}{alike.fewer}; {number(inside.value, 2)} % of its "
-                f"surface lies inside the body{inside.fewer}."
-            )
-    return " ".join(sentences)
-
-
-def secondary_motion(amplitude: float) -> str:
-    """Return how much of the simulation's secondary motion there is, in words."""
-    if amplitude < 0.2:
-        return "almost no"
-    if amplitude < 0.8:
-        return "less"
-    return "about as much" if amplitude < 1.25 else "more"
-
-
-def _cost(run: Run, worn: pd.DataFrame) -> str:
-    """Say how long a frame takes, and how many times as long with the simulation."""
-    cells = run.cells("speed", "garments")
-    scenes = next(iter(compared_scenes(run, cells).values()), [])
-    timed = cells[cells["scene"].isin(scenes)] if scenes else worn
-    metric = run.metrics.get(run_time(timed))
-    network = next(iter(subjects(run, set(timed[timed["usable"]]["method"]))), NETWORK)
-    compared = compare_methods(run, timed, metric, run.reference, network) if metric else None
-    if compared is None or compared.effect is None or compared.other is None or not compared.other.value:
-        return ""
-    ends = compared.effect.interval or (compared.effect.shown,)
-    times = " to ".join(dict.fromkeys(number(end, 2) for end in ends))
-    whole = " from pose to vertices" if compared.metric.name == "cost/whole" else ""
-    return (
-        f"On one core {run.label(network)} takes {number(compared.other.value)} ms a frame{whole}, the "
-        f"simulation {times} times as long{f', {in_scenes(scenes)}' if scenes else ''}."
-    )
 
 
 def _certainty(run: Run, worn: pd.DataFrame) -> str:

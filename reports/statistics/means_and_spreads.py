@@ -130,20 +130,15 @@ def _mean(lines: Sequence[Any], scenes: int, failed: Set[int]) -> Mean:
     )
 
 
-def mean_of(
-    frame: pd.DataFrame, method: str, metric: str, scenes: Iterable[str] | None = None
-) -> Mean | None:
-    """Return the mean over the scenes (all by default) and seeds that have the metric, None without any."""
-    rows = frame if scenes is None else frame[frame["scene"].isin(list(scenes))]
-    rows = rows[(rows["metric"] == metric) | ~rows["usable"]]
+def mean_of(frame: pd.DataFrame, method: str, metric: str) -> Mean | None:
+    """Return the mean over the scenes and seeds that have the metric, None without any."""
+    rows = frame[(frame["metric"] == metric) | ~frame["usable"]]
     return means(rows, "method", "metric").get((method, metric))
 
 
-def value_of(
-    frame: pd.DataFrame, method: str, metric: str, scenes: Iterable[str] | None = None
-) -> float | None:
+def value_of(frame: pd.DataFrame, method: str, metric: str) -> float | None:
     """Return the value of `mean_of`, or None."""
-    mean = mean_of(frame, method, metric, scenes)
+    mean = mean_of(frame, method, metric)
     return None if mean is None else mean.value
 
 

@@ -167,7 +167,7 @@ ACCURACIES = ("gap/energy", "curvature/error")
 
 def rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
     """Return the solvers that SNUG competes with: the reference, and the fastest ones as accurate."""
-    names = [run.reference] if mean_of(frame, run.reference, TIME, scenes) else []
+    names = [run.reference] if mean_of(frame[frame["scene"].isin(list(scenes))], run.reference, TIME) else []
     for metric in ACCURACIES:
         points = points_of(run, frame, scenes, metric)
         network = next((p for p in points if p.method == NETWORK), None)

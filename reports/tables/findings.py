@@ -38,10 +38,10 @@ def findings(run: Run) -> list[Table]:
         Column("lower", "First", text=True, method=True),
         Column("claimed", "Claim", text=True),
         Column("higher", "Second", text=True, method=True),
-        Column("first", "Of the first", mixed=True),
-        Column("second", "Of the second", mixed=True),
-        Column("effect", "Effect", mixed=True),
-        Column("p", "p", digits=2, mixed=True),
+        Column("first", "Of the first"),
+        Column("second", "Of the second"),
+        Column("effect", "Effect"),
+        Column("p", "p", digits=2),
         Column("verdict", "Here", text=True),
     )
     rows: list[tuple[Cell, ...]] = [

@@ -122,10 +122,10 @@ def error_rivals(run: Run) -> list[Table]:
         lines.append((run.metrics[metric].heading, network.error, network.time, *no_slower, *as_accurate))
     columns = (
         Column("error", "Error", text=True),
-        Column("network", "Of SNUG", mixed=True),
+        Column("network", "Of SNUG"),
         Column("network_time", "Run time of SNUG", "ms"),
         Column("no_slower", "Best that is no slower", text=True, method=True),
-        Column("no_slower_error", "Its error", mixed=True),
+        Column("no_slower_error", "Its error"),
         Column("no_slower_time", "Its run time", "ms"),
         Column("as_accurate", "Fastest solver as accurate", text=True, method=True),
         Column("as_accurate_time", "Its run time", "ms"),

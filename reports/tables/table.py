@@ -20,7 +20,6 @@ from reports.statistics.means_and_spreads import Mean
 DASH = "–"
 CSV_DASH = "-"
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-_FIGURE_SPACE, _POINT_SPACE = "\u2007", "\u2008"
 
 
 def number(value: float | None, digits: int = 3, *, trim: bool = False) -> str:
@@ -82,26 +81,6 @@ def csv_number(value: float | None) -> str:
     return f"{value:.9g}"
 
 
-def aligned(texts: Sequence[str]) -> list[str]:
-    """Pad the texts on the right by spaces as wide as digits, so that decimal points stand in a column.
-
-    Only plain decimals are padded; a dash, a spread or a power of ten is left as it is.
-    """
-    tails = [len(text.partition(".")[2]) if _is_plain(text) else 0 for text in texts]
-    widest = max(tails, default=0)
-    padded = []
-    for text, tail in zip(texts, tails):
-        if not _is_plain(text) or tail == widest:
-            padded.append(text)
-        else:
-            padded.append(text + ("" if tail else _POINT_SPACE) + _FIGURE_SPACE * (widest - tail))
-    return padded
-
-
-def _is_plain(text: str) -> bool:
-    return bool(text) and all(letter in "−,.0123456789" for letter in text)
-
-
 def in_scenes(scenes: Collection[str]) -> str:
     """Return "in 1 scene", "in 2 scenes" or, of liveliest parts alone, "in 2 clips"."""
     kind = "clip" if all(name.endswith("@clip") for name in scenes) else "scene"
@@ -127,7 +106,7 @@ class Column:
     """A column: its name in the CSV, its title and unit in the PDF, and how it is set there.
 
     text: words, set from the left; method: names of methods, printed by their labels. digits: of its numbers;
-    trim: without zeros at their end; mixed: of several units, whose points need not stand in a column.
+    trim: without zeros at their end.
     rounding: size below which a number is rounding error and printed as 0; the CSV keeps it.
     """
 
@@ -138,7 +117,6 @@ class Column:
     method: bool = False
     digits: int = 3
     trim: bool = False
-    mixed: bool = False
     rounding: float = 0.0
 
     @property
@@ -259,7 +237,6 @@ def remarks_below(table: Table, lines: Sequence[Sequence[CellText]]) -> str:
 def column_texts(run: Run, column: Column, cells: Sequence[Cell], printed: Sequence[str]) -> list[CellText]:
     """Return text, spread or interval, and marks of a column's cells; `printed`: the paper's rows below."""
     texts = [*(_text(run, column, cell) for cell in cells), *printed]
-    texts = texts if column.text or column.mixed else aligned(texts)
     lines = []
     for text, cell in zip(texts, [*cells, *[None] * len(printed)]):
         spread, mark = "", ""

@@ -16,23 +16,28 @@ runs of RUN, ...                             day, commit and processor
 evaluations of published runs                how often they evaluated test motions
 
 From the code come `attributes of MODULE.CLASS; NAME, ...`, `docstring of MODULE` (its table),
-`recipes of NAME, ...` and the parts that `code_parts.PARTS` names.
+`recipes of NAME, ...` and the parts that `PARTS` names.
 """
 
 from __future__ import annotations
 
 import math
 import re
+from argparse import SUPPRESS, ArgumentParser
 from collections import Counter
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cache
+from importlib import import_module
 from pathlib import Path
-from typing import Any
 
+from benchmarks.declarations import attributes_of
+from benchmarks.metrics import declared
+from benchmarks.plan.options import make_parser
+from benchmarks.plan.study import PACKAGED, read_study
+from benchmarks.presets import PRESETS
 from benchmarks.results.run_folder import RunFolder
 from reports.finished_run import Run
-from reports.sentences import ALIKE, GAP, SWING, secondary_motion
 from reports.statistics.effects import RATIO
 from reports.statistics.means_and_spreads import mean_of
 from reports.statistics.outcomes import PUBLISHED, read_published
@@ -44,13 +49,15 @@ from reports.tables import TABLES
 from reports.tables.page_one import overview
 from reports.tables.pivots import metric_tables
 from reports.tables.table import DASH, Table, number
-from reports.text.code_parts import PARTS, attribute_rows, chosen_rows, docstring_rows, recipe_rows
 from reports.text.text_table import markdown_table, remarks_on, text_rows
+from snug.motion.library import source_rows
+from snug.named_recipes import RECIPES
 
 TIMED = ("quick",)  # runs with nothing beside them, which judge claims on times
 TIMES = ("s", "ms")  # units
 FAMILIES = {"primary": PRIMARY, "exploratory": EXPLORATORY}
 NOT_MEASURED = "not measured"
+SWING, ALIKE = "dynamics/amplitude", "dynamics/correlation"
 Rows = Sequence[Sequence[str]]
 
 
@@ -63,13 +70,13 @@ def published_part(request: str) -> str:
     """
     what, _, source = request.partition(" of ")
     names, *lists = source.split(";")
-    wanted, methods = (_words(text, ",") for text in (*lists, "", "")[:2])
-    folders = [PUBLISHED / name for name in _words(names, ",")]
+    wanted, methods = (_words(text) for text in (*lists, "", "")[:2])
+    folders = [PUBLISHED / name for name in _words(names)]
     kind, _, name = what.partition(" ")
     if (part := request.partition(";")[0]) in PARTS:
         return markdown_table(chosen_rows(PARTS[part](), wanted))
     if request == "evaluations of published runs":
-        return markdown_table(evaluation_rows(PUBLISHED))
+        return markdown_table(evaluation_rows())
     if what == "table overview" and methods:
         return markdown_table(_overview(folders, wanted, methods))
     forms: dict[str, Callable[[], str | Rows]] = {
@@ -88,8 +95,8 @@ def published_part(request: str) -> str:
     return made if isinstance(made, str) else markdown_table(made)
 
 
-def _words(text: str, separator: str) -> list[str]:
-    return [word.strip() for word in text.split(separator) if word.strip()]
+def _words(text: str) -> list[str]:
+    return [word.strip() for word in text.split(",") if word.strip()]
 
 
 @cache
@@ -162,7 +169,7 @@ def front_sentences(run: Run) -> str:
     swing, alike = (mean_of(worn, NETWORK, name) for name in (SWING, ALIKE))
     scenes = next(iter(compared_scenes(run, cells).values()), [])
     timed = cells[cells["scene"].isin(scenes)]
-    points = points_of(run, cells, scenes, GAP)
+    points = points_of(run, cells, scenes, "gap/energy")
     network = next((point for point in points if point.method == NETWORK), None)
     solver = fastest(truncated(run, points), network.error) if network else None
     faster = compare_methods(run, timed, run.metrics[run_time(timed)], run.reference, NETWORK).effect
@@ -187,27 +194,33 @@ def front_sentences(run: Run) -> str:
     ])  # fmt: skip
 
 
+def secondary_motion(amplitude: float) -> str:
+    """Return how much of the simulation's secondary motion there is, in words."""
+    if amplitude < 0.2:
+        return "almost no"
+    if amplitude < 0.8:
+        return "less"
+    return "about as much" if amplitude < 1.25 else "more"
+
+
 def run_rows(folders: Sequence[Path]) -> Rows:
     """Return a heading, and day, commit and processor of each run, of each part of a merged one."""
     parts = [
         (folder.name, str(part.get("finished", ""))[:10], part["commit"], part["hardware"]["processor"])
         for folder in folders
-        for part in _parts(RunFolder(folder).read_config())
+        for config in [RunFolder(folder).read_config()]
+        for part in config.get("merged", [config])
     ]
     return [("Run", "Day", "Commit", "Processor"), *dict.fromkeys(parts)]
 
 
-def _parts(config: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
-    return config.get("merged", [config])
-
-
-def evaluation_rows(published: Path) -> Rows:
-    """Return a heading and rows of the runs in a folder: how often each evaluated test motions.
+def evaluation_rows() -> Rows:
+    """Return a heading and rows of the published runs: how often each evaluated test motions.
 
     Runs of one protocol and split with the same number of test-set evaluations share a row.
     """
     runs: dict[tuple[str, str, str], list[str]] = {}
-    for path in sorted(published.glob("*/run.json")):
+    for path in sorted(PUBLISHED.glob("*/run.json")):
         config = RunFolder(path.parent).read_config()
         group = config["protocol"]["number"], str(config["split"]), str(len(config["test_looks"]))
         runs.setdefault(group, []).append(f"`{path.parent.name}`")
@@ -246,6 +259,123 @@ def _made(folder: Path, name: str) -> Table:
     if not made:
         raise KeyError(f"table {name} of {folder.name}")
     return made[0]
+
+
+ALL = 10_000  # frames or more: whole motions
+
+
+def option_rows(parser: ArgumentParser) -> Rows:
+    """Return a heading and a row of each option of a command, with the text of its --help.
+
+    >>> parser = ArgumentParser()
+    >>> _ = parser.add_argument("--seed", metavar="N", default=0, help="of training (default %(default)s)")
+    >>> option_rows(parser)[1]
+    ('`--seed N`', 'of training (default 0)')
+    """
+    texts = parser._get_formatter()
+    shown = [action for action in parser._actions if action.option_strings and action.help != SUPPRESS]
+    rows = [
+        (f"`{texts._format_action_invocation(action)}`", texts._expand_help(action).replace("<", "\\<"))
+        for action in shown
+    ]
+    return [("Option", "Meaning"), *(row for row in rows if "--help" not in row[0])]
+
+
+def chosen_rows(rows: Rows, names: Sequence[str]) -> Rows:
+    """Return the heading and the rows whose first cells have these names, in their order; all without names.
+
+    >>> chosen_rows([("Field", "Content"), ("`dt`", "[s]"), ("`frames`", "number")], ["frames"])
+    [('Field', 'Content'), ('`frames`', 'number')]
+    """
+    row_of_name = {name: row for row in rows[1:] for name in re.findall(r"[\w-]+", row[0])}
+    return [rows[0], *(row_of_name[name] for name in names)] if names else rows
+
+
+def attribute_rows(path: str) -> Rows:
+    """Return a heading and a row of each attribute that the docstring of a class describes.
+
+    Args:
+        path: module and class, as "reference_sim.material.Material".
+
+    >>> attribute_rows("benchmarks.method.Reporting")[2]
+    ('`level`', 'place on that curve, as a number of iterations or a tolerance')
+    """
+    module, _, name = path.rpartition(".")
+    entries = attributes_of(getattr(import_module(module), name))
+    rows = [(f"`{names.replace(', ', '`, `')}`", content) for names, content in entries.items()]
+    return [("Field", "Content"), *rows]
+
+
+def docstring_rows(module: str) -> Rows:
+    """Return the rows of the table in the docstring of a module.
+
+    >>> docstring_rows("snug.body.smpl_files")[2]
+    ('faces, closed and wound outwards', '`f`, `faces`', '(F, 3)')
+    """
+    text = import_module(module).__doc__ or ""
+    lines = [line.strip("|") for line in text.splitlines() if line.startswith("|")]
+    rows: Rows = [tuple(cell.strip() for cell in line.split("|")) for line in lines]
+    return [rows[0], *rows[2:]]
+
+
+def recipe_rows(names: str) -> Rows:
+    """Return a heading and a row of each option in which recipes differ: values, first sentence on it.
+
+    Args:
+        names: of the recipes, as "default, paper".
+
+    >>> recipe_rows("default, paper")[4][:3]
+    ('`zero_last_layer`', 'True', 'False')
+    """
+    chosen = names.split(", ")
+    rows = []
+    for option, meaning in attribute_rows("snug.recipe.Recipe")[2:]:
+        values = [getattr(RECIPES[name], option.strip("`")) for name in chosen]
+        if len(set(values)) > 1:
+            texts = (f"{value:g}" if isinstance(value, float) else str(value) for value in values)
+            rows.append((option, *texts, meaning.partition(". ")[0]))
+    return [("Option", *(f"Recipe `{name}`" for name in chosen), "Meaning"), *rows]
+
+
+def metric_rows() -> Rows:
+    """Return a heading and a row of each declared metric: name, unit, definition."""
+    rows = ((f"`{metric.name}`", metric.unit, metric.definition) for metric in declared().values())
+    return [("Metric", "Unit", "Definition"), *rows]
+
+
+def size_rows() -> Rows:
+    """Return a heading and a row of each set of sizes, with the steps of SNUG's training."""
+    heads = ("Sizes", "Vertices", "Test motions", "Frames of each", "Steps of SNUG", "Description")
+    rows = []
+    for preset in PRESETS:
+        motions = "all" if preset.test_motions is None else str(preset.test_motions)
+        frames = "all" if preset.frames >= ALL else f"at most {preset.frames}"
+        sizes = (str(preset.garment_vertices), motions, frames, f"{preset.steps['snug']:,}")
+        rows.append((f"`{preset.name}`", *sizes, preset.description))
+    return [heads, *rows]
+
+
+def study_rows() -> Rows:
+    """Return a heading and a row of each study of the package: its question and parts."""
+    studies = {path.stem: read_study(path.stem) for path in sorted(PACKAGED.glob("*.toml"))}
+    rows = [(f"`{name}`", study.question, ", ".join(study.parts)) for name, study in studies.items()]
+    return [("Study", "Question", "Parts"), *rows]
+
+
+def part_rows() -> Rows:
+    """Return a heading and a row of each part of the studies that are no published run."""
+    parts = read_study("full").parts
+    return [("Part", "Question"), *((f"`{name}`", part.question) for name, part in parts.items())]
+
+
+PARTS = {
+    "metrics": metric_rows,
+    "sizes": size_rows,
+    "studies": study_rows,
+    "parts": part_rows,
+    "options of benchmarks.run": lambda: option_rows(make_parser()),
+    "sources of the library": lambda: list(source_rows()),
+}
 
 
 BEGIN, END = "<!-- generated: {} -->", "<!-- end of generated -->"

@@ -35,7 +35,7 @@ ALLOWED = {
 # The referee's solvers are not for the contestants.
 FORBIDDEN = {"snug": ("reference_sim.minimise", "reference_sim.simulate", "reference_sim.time_loop")}
 # The documents list texts of the code.
-LISTING = ("reports/text/code_parts.py",)
+LISTING = ("reports/text/published_parts.py",)
 # A run ends by making the report of the run that it wrote.
 EXCEPTIONS = {("benchmarks/runner/execute_plan.py", "reports.build.build_report")}
 # Headline geometry must not share an error with the physics.

@@ -16,8 +16,14 @@ from reports.statistics.effects import EXCESS, Effect
 from reports.statistics.means_and_spreads import Mean
 from reports.tables import make_tables
 from reports.tables.table import METHOD, Column, Table
-from reports.text.code_parts import attribute_rows, docstring_rows
-from reports.text.published_parts import BEGIN, END, fill, published_part
+from reports.text.published_parts import (
+    BEGIN,
+    END,
+    attribute_rows,
+    docstring_rows,
+    fill,
+    published_part,
+)
 from reports.text.text_table import answer, remarks_on, text_rows
 from snug.body.smpl_files import SYNONYMS
 from snug.motion.files import ARRAY_NAMES
