@@ -1,9 +1,7 @@
 """Recipe: every choice of a training run in one frozen place. The named ones are in snug.named_recipes.
 
-No recipe holds a balancing weight between the energies: there is none. `Recipe.terms` names any energy of
-`reference_sim.energies`, and every other subclass of Energy that has been imported, if the rest state of the
-garment is all that it needs. A term that declares no kernel "training_batch" is trained more slowly, and one
-line says so. Imports nothing heavy, so that a command can list recipes without loading torch.
+No recipe holds a balancing weight between the energies: there is none. `Recipe.terms` names any energy that
+`find_energy` knows. Imports nothing heavy, so that a command can list recipes without loading torch.
 """
 
 from __future__ import annotations

@@ -48,19 +48,9 @@ def walk_to_foot(
 ) -> tuple[np.uint32, np.float32, np.float32]:
     """Return the face, and weights of its second and third corner, where an anchor rests for a sample at x.
 
-    Args:
-        x0: position of the sample [m].
-        x1: second coordinate.
-        x2: third coordinate.
-        face: to begin with.
-        skin: (B, 3) [m].
-        faces: (Q, 3).
-        adjacency: (Q, 3), see `triangle_adjacency`.
-        centroids: (Q, 3) [m] of the faces at rest.
-        homes: (S, 3) [m] of the samples at rest.
-        sample: index in homes.
-        reach: [m^2] the rule of regions, squared.
-        corners: (1, 3, 3) room to work in.
+    It starts on `face` of the body: skin (B, 3) [m] and faces (Q, 3). It enters no face whose centroid at
+    rest is farther than the root of `reach` [m^2] from homes (S, 3), the samples at rest. corners (1, 3, 3)
+    is room to work in.
     """
     last, zero, one = face, np.float32(0.0), np.float32(1.0)
     for _ in range(CROSSINGS):

@@ -9,7 +9,6 @@ Three things make it faster than torch.nn.GRU under autograd: products of one so
 together, weight gradients above all; what stands between them is one kernel; and forward products go to
 oneDNN where torch has it, which on a CPU with AVX-512 that is not Intel's is twice as fast as MKL. The
 weights stay those of the modules.
-tests/snug/networks/test_regressor.py holds values and gradients to the modules' own.
 """
 
 from __future__ import annotations

@@ -28,10 +28,6 @@ class DressedBody:
 
     The rest state of all energies is the garment's, for every body shape: the same shirt on a larger body is
     a stretched shirt.
-
-    Args:
-        body: the body.
-        garment: tailored to that body.
     """
 
     def __init__(self, body: Body, garment: Garment) -> None:
@@ -45,11 +41,8 @@ class DressedBody:
     def weights(self, smoothing: int) -> Tensor:
         """Return skinning weights (V, 24), borrowed from the body and averaged over neighbours.
 
-        Args:
-            smoothing: sweeps on a garment of 1000 vertices. A sweep reaches as far as an edge is long, so
-                other garments get sweeps in proportion to their vertices and are smoothed over the same
-                length: with 20 for all, a shirt of 300 vertices is drawn into the body and one of 4400 keeps
-                half of its skinning noise.
+        smoothing: sweeps at 1000 vertices. A sweep reaches as far as an edge is long, so that other garments
+        get sweeps in proportion to their vertices, and are smoothed over the same length.
         """
         if smoothing not in self._weights:
             borrowed = weights = np.asarray(self.garment.skinning_weights)

@@ -1,8 +1,7 @@
 """One frame of a network and skinning, laid out for the compiled call of snug.kernels.one_frame.
 
 Each network adds its operations by `lay_out(plan, x)`, in terms of its own modules: its `forward` for one
-frame. All numbers of a frame, the state included, lie in one array. tests/snug/networks/test_frame_layout.py
-compares every kind with its `forward`.
+frame. All numbers of a frame, the state included, lie in one array.
 """
 
 from __future__ import annotations
@@ -37,12 +36,7 @@ class FramePlan:
     """The operations of one frame, and the array of all its numbers.
 
     Places of numbers are slices of that array. Matrices are stored in the order in which they are named.
-
-    Args:
-        order: vertices (V,) as they are skinned.
-        padded: number of vertices, filled up to whole blocks.
-        pins: vertices without offset.
-        scale: factor on the offsets.
+    order: vertices (V,) as they are skinned; padded: their number, filled up to whole blocks.
     """
 
     def __init__(

@@ -177,20 +177,8 @@ def make_network(
 ) -> GarmentNetwork:
     """Make a network at its start; the same seed gives the same weights, whatever was drawn before.
 
-    Args:
-        kind: one of snug.kinds.KINDS.
-        inputs: number of features D.
-        vertices: number of vertices V.
-        recipe: gives the rules of initialisation, whether the last layer starts at zero instead, and the
-            scale of the output.
-        seed: of the random weights.
-        pins: vertices without offset, which the body carries.
-
-    Returns:
-        A network that maps features (N, T, D) to offsets (N, T, V, 3) [m].
-
-    Raises:
-        ValueError: for an unknown kind.
+    It maps features (N, T, D = inputs) to offsets (N, T, V, 3) [m], none at the pins, which the body carries.
+    Raises ValueError for an unknown kind.
 
     Example:
         >>> from snug.recipe import DEFAULT

@@ -46,11 +46,6 @@ def joint_motion(
 
     The first frame is at rest. Rotations have no unit, rates are [1/s], accelerations [m/s^2].
 
-    Args:
-        body: gives the lengths of the bones.
-        motion: T frames.
-        betas: shape numbers of the body; None is the mean body.
-
     Source:
         H. Bertiche, M. Madadi and S. Escalera, Neural cloth simulation, ACM Transactions on Graphics 41
         (2022), article 220.

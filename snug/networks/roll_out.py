@@ -88,17 +88,8 @@ def prepare_roll_out(
 ) -> Callable[[], Trajectory]:
     """Do all that comes before the first frame; return a function that gives the trajectory of `roll_out`.
 
-    Args:
-        model: see `prepare_frames`.
-        dressed: body and garment.
-        motion: T frames.
-        betas: shape numbers of the body.
-        kept: numbers of the frames that the trajectory holds, or None for all; every one is computed.
-        earlier: the motion before this one, see `prepare_frames`.
-        postprocess: applied to each frame's positions (V, 3) [m] and number.
-
-    Raises:
-        RollOutError: if the model does not fit.
+    Every frame is computed; the trajectory holds those whose numbers are `kept`, None for all. `postprocess`
+    is applied to each frame's positions (V, 3) [m] and number. All else: see `prepare_frames`.
     """
     frames = prepare_frames(model, dressed, motion, betas, earlier=earlier)
     held = np.arange(motion.frames) if kept is None else kept
@@ -163,13 +154,7 @@ def _trajectory(
 
 
 class CompiledFrame:
-    """A compiled call that skins an unposed garment, with a network's offsets if there is a network.
-
-    Args:
-        rest: unposed garment (V, 3) [m].
-        weights: skinning weights (V, J).
-        network: gives the offsets; None skins alone.
-    """
+    """A compiled call that skins an unposed garment (V, 3) [m] by weights (V, J), with a network or none."""
 
     def __init__(self, rest: Tensor, weights: Tensor, network: GarmentNetwork | None = None) -> None:
         order, *joints = blocks_of_vertices(weights.numpy())
@@ -195,14 +180,10 @@ class CompiledFrame:
         work: np.ndarray,
         out: np.ndarray,
     ) -> None:
-        """Write the world vertices into `out`, and the state after this frame into `work`.
+        """Write the world vertices into `out` (V, 3) [m] float64, and the state after this frame into `work`.
 
-        Args:
-            features: (D,) float32; unused without a network.
-            transforms: of the joints, (J, 3, 4) float32.
-            pelvis: (3,) [m] float64.
-            work: array of `start`, or as the frame before left it.
-            out: (V, 3) [m] float64.
+        work: array of `start`, or as the frame before left it; features (D,) float32, unused without a
+        network; transforms of the joints (J, 3, 4) float32; pelvis (3,) [m] float64.
         """
         if self._operations is None:  # without a network no more than skinning is compiled
             skin_frame(work, *self._skinning, transforms, pelvis, out)

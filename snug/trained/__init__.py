@@ -15,11 +15,6 @@ SUFFIX = ".safetensors"
 def network_name(network: str, garment: str, seed: int) -> str:
     """Return the name of a network of the package.
 
-    Args:
-        network: name of its training, as `snug`.
-        garment: what it dresses, as `tshirt`.
-        seed: of its training.
-
     >>> network_name("snug", "tshirt", 0), network_name("pbns", "tshirt", 2)
     ('snug-tshirt', 'pbns-tshirt-seed2')
     """

@@ -90,12 +90,7 @@ def make_mixed_clips(
 ) -> list[Motion]:
     """Make about `frames` frames of mixed clips, named mixed_0, mixed_1, ...; deterministic for a seed.
 
-    Args:
-        motions: parts of the body are taken from these.
-        frames: in all clips together.
-        turn: standard deviation of the added turns, per axis [rad]; half of it stays, half comes and goes.
-        lifted: share of the thighs that are lifted.
-        seed: of all random choices.
+    turn: standard deviation of the added turns, per axis [rad]; lifted: share of the thighs that are lifted.
     """
     random = np.random.default_rng(seed)
     count = max(1, round(frames / CLIP_FRAMES)) if frames > 0 else 0

@@ -44,10 +44,7 @@ class CapturedTrainer(Trainer):
     def learn(
         self, number: int, windows: np.ndarray, betas: np.ndarray | None, state: Tensor | None
     ) -> dict[str, float]:
-        """Replay the step; see Trainer.learn, which takes it in the first steps, and where it is not to be.
-
-        That is where the guard would not simply update: weights, anchors and guard are then as they were.
-        """
+        """Replay the step; Trainer.learn takes the first ones, and those that the guard would not follow."""
         means: dict[str, float] = {}
         self._asked += 1
         if self.capturable and self._asked > UNCAPTURED and self.optimiser.state:

@@ -3,11 +3,10 @@
 The loss needs, for each contact sample x of each frame, a plane (closest body point c, outward normal n), so
 that d = n.(x - c). Searching it in every step would cost more than the rest of the step together. So an
 anchor (a body face and barycentric coordinates) is kept for each frame and sample; body vertices of the frame
-carry it to a plane in no time. Near the skin it walks to where its sample is now, whenever the energy is
-taken (snug.kernels.contact), and a few frames of each batch are searched anew from the current
-prediction, with the simulator's own search and its rule of regions. All positions are float32, relative to
-the pelvis. With thousands of frames cached, an anchor has four bytes, two of them for its face: barycentric
-coordinates are whole 255ths, which moves it along its face, by some 0.03 mm.
+carry it to a plane in no time. It walks with its sample (snug.kernels.contact), and a few frames of each
+batch are searched anew (snug.training.contact_planes), by the simulator's own search and rule of regions.
+Positions are float32, relative to the pelvis. With thousands of frames cached, an anchor has four bytes:
+barycentric coordinates are whole 255ths, which moves it along its face by some 0.03 mm.
 """
 
 from __future__ import annotations
@@ -29,18 +28,8 @@ EXACT = 0.015  # m: a sample farther from the skin than this is in no contact, a
 class Patch:
     """The part of a body that one garment may touch.
 
-    Args:
-        samples: contact samples of the garment (S, 3) [m].
-        body_positions: the body in its T-pose (B, 3) [m].
-        body_faces: (Fb, 3).
-        region: largest distance [m] in the T-pose from a sample to a face it may touch.
-
-    Attributes:
-        body_vertices: (P,) into the whole body.
-        faces: (Q, 3) into the patch.
-        rest, centroids: (P, 3) and (Q, 3) [m] in the T-pose.
-        adjacency: (Q, 3), see snug.kernels.contact.triangle_adjacency.
-        tree, samples: to search the faces with, and lists of the faces that samples may meet.
+    It has faces (Q, 3) between vertices (P,) of the body, at most `region` [m] in the T-pose from a sample of
+    the garment (S, 3) [m].
 
     Raises:
         ValueError: no face of the body lies within `region` of the garment.
@@ -73,18 +62,10 @@ class Patch:
         self, points: np.ndarray, positions: np.ndarray, anchor_faces: np.ndarray | None = None, *,
         exact: bool = False,
     ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-        """Find the closest allowed body point of each sample in one frame.
+        """Find the closest allowed body point of samples (S, 3) [m] in one frame of the patch (P, 3) [m].
 
-        Beyond EXACT from the skin an old anchor stands as long as no face is half as far.
-
-        Args:
-            points: samples (S, 3) [m].
-            positions: of the patch, (P, 3) [m].
-            anchor_faces: (S,), faces to look at first.
-            exact: let no old anchor stand.
-
-        Returns:
-            Faces (S,), and barycentric coordinates (S, 2) of the second and third corner.
+        Beyond EXACT from the skin an old anchor (S,) stands as long as no face is half as far, unless the
+        search is `exact`. Returns faces (S,), barycentric coordinates (S, 2) of second and third corners.
         """
         self.tree.refit(positions)
         nearest = self.tree.nearest(
@@ -127,18 +108,9 @@ class ContactCache:
     ) -> np.ndarray:
         """Return the contact energy (C, TRAINING_LANES) [J] of garments; add its gradient to `gradients`.
 
-        Values are zero in lanes beyond the last frame. A sample that is out of reach costs no more than the
-        look at its anchor, and no plane is stored.
-
-        Args:
-            contact: the contact term.
-            x: (C, V, 3, TRAINING_LANES) float32 [m], see snug.kernels.skinning.
-            gradients: like x [N].
-            frames: (N, T).
-            rows: (N, T), the row of each frame in the two arrays that follow.
-            positions: (R, P, 3), of the patch [m].
-            normals: (R, P, 3).
-            walk: whether anchors near the skin first walk to where their samples are, and stay there.
+        Garments x (C, V, 3, TRAINING_LANES) lie as in snug.kernels.skinning, the patch of each of the frames
+        (N, T) in its row (N, T) of positions [m] and normals (R, P, 3). With `walk`, anchors near the skin
+        first walk to where their samples are, and stay there. Lanes beyond the last frame are zero.
         """
         values, patch = np.zeros((len(x), TRAINING_LANES), np.float32), self.patch
         body = positions, normals, patch.faces.view(np.uint32), patch.adjacency, patch.centroids

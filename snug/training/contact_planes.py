@@ -1,9 +1,7 @@
 """Contact planes of batches of a training set, from cached anchors, queried anew as the network learns.
 
-Anchors walk with their samples in every step (snug.kernels.contact). The middle frames of a few
-windows in a step are searched, for skin that no walk would reach. Their anchors are propagated to the frames
-around them that show almost the same pose. Propagated farther, an anchor from where the thigh was elsewhere
-claims a contact that is none, or misses a thigh that stands in the hem.
+The middle frames of a few windows in a step are searched, for skin that no walk would reach. Their anchors
+are propagated to the frames around them that show almost the same pose: farther off the thigh is elsewhere.
 """
 
 from __future__ import annotations
@@ -141,11 +139,7 @@ NEAR, FIRST_NEAR = 0.03, 0.07
 class TrainingContact:
     """Anchors of all training frames, and the steps since each frame's were last searched or propagated.
 
-    Args:
-        data: the training set.
-        contact: the contact term, with its samples.
-        kept: whether each frame has one body for good; the kernels then pose them all once.
-        kernels: in numpy and numba, else in torch on the set's device.
+    kept: see BodyPatches; kernels: in numpy and numba, else in torch on the set's device.
     """
 
     def __init__(self, data: TrainingSet, contact: ContactPenalty, *, kept: bool, kernels: bool) -> None:
@@ -167,11 +161,8 @@ class TrainingContact:
     def planes(self, batch: Batch, posed: Posed, x: Tensor | None = None) -> Planes:
         """Return points and normals (N, T, S, 3) at the cached anchors, or, with kernels, the energy itself.
 
-        Args:
-            batch: windows.
-            posed: its bodies.
-            x: (N, T, V, 3), vertices that the anchors first walk to, until `settle` decides whether for
-                good; None where they have just been searched.
+        x (N, T, V, 3): vertices that the anchors first walk to, until `settle` decides whether for good; None
+        where they have just been searched.
         """
         walk = x is not None
         if walk:
@@ -191,13 +182,9 @@ class TrainingContact:
         return points.unflatten(0, batch.frames.shape), normals.unflatten(0, batch.frames.shape)
 
     def walked(self, frames: Tensor, first: Tensor, posed: Posed, x: Tensor) -> Anchors:
-        """Return where the anchors of a batch walk; nothing is kept, nothing waited for.
+        """Return where the anchors of frames (N T,) walk to vertices x (N, T, V, 3); keep and await nothing.
 
-        Args:
-            frames: (N T,), row numbers on the device.
-            first: (N T,), see snug.training.contact_cache_torch.first_places.
-            posed: bodies of the batch.
-            x: (N, T, V, 3), vertices that the anchors walk to.
+        first (N T,): see snug.training.contact_cache_torch.first_places.
         """
         assert isinstance(self.cache, TensorContactCache)
         samples = self._samples(x.detach().flatten(0, 1))
@@ -223,13 +210,7 @@ class TrainingContact:
         self._changed[:] = False  # a resumed run makes these anchors again
 
     def requery(self, frames: np.ndarray, posed: Posed, x: Tensor) -> None:
-        """Search a few windows of a batch anew, those whose last search is longest ago.
-
-        Args:
-            frames: (N, T), of the whole batch.
-            posed: bodies of its windows.
-            x: (N, T, V, 3), predicted vertices.
-        """
+        """Search a few of the windows (N, T) with vertices (N, T, V, 3) anew, those searched longest ago."""
         self._credit += REFRESH * frames.size
         count = int(self._credit)
         self._credit -= count
@@ -264,10 +245,7 @@ class TrainingContact:
         self.age[others], self._changed[others] = 0, True
 
     def settle(self, frames: np.ndarray, *, trusted: bool) -> None:
-        """Keep the anchors' places since `planes` if the prediction is trusted, else put them back.
-
-        frames: see `requery`.
-        """
+        """Keep the anchors' places since `planes` if the prediction is trusted, else put them back."""
         if self._before and not trusted:
             age, rows, *before = self._before
             self.age[:] = age
@@ -279,10 +257,7 @@ class TrainingContact:
     def search(
         self, places: np.ndarray, frames: np.ndarray, posed: Posed, x: Tensor, *, exact: bool = False
     ) -> None:
-        """Search the anchors of some places (n,) among the frames (N T,) of a batch.
-
-        exact: see ContactCache.requery; other arguments: see `requery`.
-        """
+        """Search the anchors of some places (n,) among the frames (N, T); exact: see ContactCache.requery."""
         flat, (rows, positions, _) = frames.ravel(), posed
         vertices, window = x.detach(), frames.shape[1]
         for place in places.tolist():

@@ -150,14 +150,7 @@ class Trainer:
     def learn(
         self, number: int, windows: np.ndarray, betas: np.ndarray | None, state: Tensor | None
     ) -> dict[str, float]:
-        """Descend once by the loss of windows; return its terms, mean over frames.
-
-        Args:
-            number: of the step.
-            windows: (N,), places of the batch's windows.
-            betas: (N, S) shape numbers, None on the mean body.
-            state: before the windows, None without one.
-        """
+        """Descend once by the loss of windows (N,) on bodies of betas (N, S); return its mean terms."""
         batch = self.data.batch(windows, betas)
         if self.loss is None:
             assert self.targets is not None

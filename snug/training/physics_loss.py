@@ -11,12 +11,9 @@ however long the window is. The recipe names two other forms of inertia (Recipe.
 
 Each energy is one torch expression in `reference_sim.energies`, the definition. On a CPU closed-form
 kernels (those that a term declares as "training_batch", or its own gradient) give the same values and
-gradients in a small part of the time, so autograd uses those. On a GPU the definitions are compiled by torch,
-and on a CPU that of an energy that has no kernel runs as it is. A recipe may name any energy of the simulator
-(snug.recipe).
-The contact planes are the one difference: training keeps an anchor for each sample, which walks along, and
-takes the skin's normal there, where the simulator searches anew in every step and takes the direction to the
-closest point.
+gradients in a small part of the time. On a GPU the definitions are compiled by torch.
+The contact planes are the one difference: training keeps an anchor for each sample, and takes the skin's
+normal there, where the simulator searches anew in every step and takes the direction to the closest point.
 
 The material of PBNS itself (Bertiche et al. 2021), springs, hinges, uniform mass, squared contact::
 
@@ -188,14 +185,9 @@ def on_device(energy: EnergyType, device: torch.device) -> EnergyType:
 
 
 class PhysicsLoss:
-    """Energies of sub-sequences, by term.
+    """Energies of sub-sequences of frames `dt` [s] apart, by term of the recipe.
 
-    Args:
-        cloth: rest state of the garment.
-        recipe: names the terms and their options.
-        dt: time between frames [s].
-        device: where the definitions run.
-        kernels: use closed forms on a CPU (in numpy and numba) where there are any, else the definitions.
+    kernels: use closed forms on a CPU (in numpy and numba) where there are any, else the definitions.
     """
 
     def __init__(

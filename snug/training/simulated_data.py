@@ -87,14 +87,7 @@ def read_data_set(path: Path, body: Body, garment: Garment) -> tuple[list[Motion
 def write_data_set(
     path: Path, body: Body, garment: Garment, simulations: Iterable[tuple[Motion, np.ndarray]]
 ) -> None:
-    """Write simulated motions to a file, whole or not at all.
-
-    Args:
-        path: the file.
-        body: wears the garment.
-        garment: that was simulated.
-        simulations: motions of T frames and world positions (T, V, 3) [m].
-    """
+    """Write simulated motions and their world positions (T, V, 3) [m] to a file, whole or not at all."""
     joint = body.joints()[0]
     with replacing(path) as temporary, h5py.File(temporary, "w") as data:
         data.attrs["format"] = DATA_SET_FORMAT
@@ -152,16 +145,10 @@ def band_loss(predicted: Tensor, target: Tensor) -> Tensor:
 
 
 class VertexTargets:
-    """Simulated vertices (F, V, 3) [m] relative to the pelvis, all training frames in a row, on a device.
+    """Simulated vertices (F, V, 3) [m] relative to the pelvis, all frames of the set's motions in a row.
 
-    Args:
-        data: the training set, of the same motions.
-        motions: whose frames stand in a row.
-        trajectories: motion name -> simulated world vertices (T, V, 3) [m].
-        weights: skinning weights (V, J) of the prediction, on the device of the set.
-
-    Raises:
-        TrainingError: for a motion without a fitting trajectory.
+    weights: skinning weights (V, J) of the prediction, on the device of the set. Raises TrainingError for a
+    motion without a fitting trajectory.
     """
 
     def __init__(

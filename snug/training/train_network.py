@@ -37,16 +37,9 @@ PIECE = 256  # frames whose loss is taken at once
 
 
 class TrainingLoop:
-    """One trainer taken through all its steps by `run`.
+    """One trainer taken through all its steps by `run`; options as `train_network` has them.
 
-    Args:
-        trainer: takes one optimisation step at a time.
-        log: gets each row of the history, every `every` steps.
-        progress: whether a bar is shown on standard error.
-        every: steps between two rows of the history.
-        checkpoint: file and times of checkpoints; None writes none.
-        validation: held-out motions; None validates with none.
-        setup_seconds: time [s] that making the trainer took.
+    setup_seconds: time [s] that making the trainer took.
     """
 
     def __init__(
@@ -215,9 +208,6 @@ def train_network(
             unbroken run. The last one stays until the caller has stored the model and calls
             `checkpoint.delete()`.
         validation: held-out motions; the weights that do best on them are kept.
-
-    Returns:
-        The trained model.
 
     Raises:
         ValueError: TrainingError, RecipeError, DeviceError or TensorFileError, naming what is

@@ -52,12 +52,8 @@ class TrainingSet:
     Everything that a batch is made of lies on `device`; only row numbers are kept in numpy.
 
     Args:
-        dressed: body and garment.
-        motions: all of one frame rate.
-        recipe: form of the inputs, length and stride of windows.
         features: set of inputs, see DressedBody.features.
         sequences: False for a static network, whose frames need no past.
-        device: where the tensors lie.
         shapes: shape numbers (M, S), one row for each motion; None: all on the mean body.
 
     Raises:
@@ -226,12 +222,8 @@ def _behind(pelvis: np.ndarray) -> Tensor:
 class HiddenStateCache:
     """States (L, F + 1, H) after each frame, zero where it never ended a window.
 
-    The last row stands for the time before a motion, when a roll-out has a state of zero.
-
-    Args:
-        first: rows at which motions begin, and the number of all frames at the end (TrainingSet.first).
-        shape: layers L and width H of a state.
-        device: where the states lie.
+    The last row stands for the time before a motion, when a roll-out has a state of zero. `first` (M + 1,):
+    rows at which motions begin, and the number of all frames.
     """
 
     def __init__(self, first: np.ndarray, shape: tuple[int, int], device: torch.device) -> None:

@@ -28,13 +28,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, kw_only=True)
 class Validation:
-    """When to validate, and with which motions.
+    """When to validate, every so many steps, and with which motions: none of training, none of the tests.
 
-    Attributes:
-        motions: none of them may be a training motion, and none a test motion.
-        every: steps between two validations.
-        patience: validations without a better value, after which training stops; 0 never stops.
-        trajectories: as for training, for the kinds that learn simulated vertices.
+    Training stops after `patience` validations without a better value, with 0 never.
     """
 
     motions: Sequence[Motion]
