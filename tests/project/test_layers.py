@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Iterator, Mapping
+from functools import cache
 from graphlib import TopologicalSorter
 from pathlib import Path
 
@@ -58,6 +59,11 @@ def imports(node: ast.AST) -> Iterator[tuple[int, str]]:
             yield from imports(child)
 
 
+@cache
+def imports_of(source: str) -> list[tuple[int, str]]:
+    return list(imports(ast.parse(source)))
+
+
 def within(name: str, roots: tuple[str, ...]) -> bool:
     return any(name == root or name.startswith(root + ".") for root in roots)
 
@@ -66,7 +72,7 @@ def complaints(relative: str, source: str) -> list[str]:
     """Every import of the file that breaks a rule."""
     layer = relative.split("/")[0]
     wrong = []
-    for line, name in imports(ast.parse(source)):
+    for line, name in imports_of(source):
         ours = within(name, LAYERS)
         allowed = within(name, ALLOWED[layer]) or (relative, name) in EXCEPTIONS or relative in LISTING
         pure = relative not in PURE or name in DECLARATIONS
@@ -108,11 +114,11 @@ def test_studies_enter_by_the_public_door_and_no_layer_imports_one():
         f"{layer}.{name}" for layer, stub in stubs.items() for name in re.findall(r" as (\w+)$", stub, re.M)
     }
     for path in (path for path in STUDIES if not path.name.startswith("test_")):
-        for _, name in imports(ast.parse(path.read_text(encoding="utf-8"))):
+        for _, name in imports_of(path.read_text(encoding="utf-8")):
             assert name in faces or within(name, DOOR) or not within(name, LAYERS), f"{path}: {name}"
     studies = ("studies", *(path.stem for path in STUDIES))
     modules = [source for layer in LAYERS for source in modules_of(layer).values()]
-    assert not [name for source in modules for _, name in imports(ast.parse(source)) if within(name, studies)]
+    assert not [name for source in modules for _, name in imports_of(source) if within(name, studies)]
 
 
 def modules_of(layer: str) -> dict[str, str]:
@@ -129,9 +135,7 @@ def in_order(modules: Mapping[str, str], depth: int) -> list[str]:
     """
     graph: dict[str, set[str]] = {}
     for module, source in modules.items():
-        parts = [
-            name.rpartition(".")[0] if name not in modules else name for _, name in imports(ast.parse(source))
-        ]
+        parts = [name.rpartition(".")[0] if name not in modules else name for _, name in imports_of(source)]
         nodes = [".".join(name.split(".")[:depth]) for name in [module, *parts] if name in modules]
         graph.setdefault(nodes[0], set()).update(set(nodes) - {nodes[0]})
     if depth == 2:

@@ -27,7 +27,7 @@ TINY = dataclasses.replace(find_preset("smoke"), garment_vertices=300, frames=10
 
 @pytest.fixture(scope="module")
 def skirt(body):
-    return find_template("skirt").tailor(body)
+    return find_template("skirt").tailor(body, vertices=600)
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,7 @@ def test_between_the_thighs_a_skirt_follows_both(body, skirt):
     assert np.allclose(w.sum(axis=1), 1.0, atol=1e-12) and w.min() >= 0
 
 
-def test_the_body_carries_the_waistband_close_and_nothing_of_a_shirt(body, skirt):
+def test_the_body_carries_the_waistband_close(body, skirt):
     motion = make_motion("turning_stop")
     frames = slice(20, 60, 10)
     poses, translations = motion.poses[frames], motion.translations[frames]
@@ -73,7 +73,6 @@ def test_the_body_carries_the_waistband_close_and_nothing_of_a_shirt(body, skirt
         assert np.abs(igl.signed_distance(band, skin, body.faces)[0]).max() < 0.02
     still = skirt.pin_positions(body, np.zeros((1, 24, 3)), np.zeros((1, 3)))[0]
     assert still == pytest.approx(skirt.rest_positions[skirt.pins], abs=1e-12)
-    assert len(find_template("tshirt").tailor(body, vertices=300).pins) == 0
 
 
 def handles(scene):

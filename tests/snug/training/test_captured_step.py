@@ -8,12 +8,14 @@ import pytest
 import torch
 
 from snug.named_recipes import PAPER
-from snug.training import contact_planes
-from snug.training.captured_step import UNCAPTURED, CapturedTrainer
+from snug.training import captured_step, contact_planes
+from snug.training.captured_step import CapturedTrainer
 from snug.training.device import CudaGraph
 from snug.training.divergence_guard import SETTLING
 from snug.training.optimisation_step import Trainer
 from tests.snug.training.dressing import PLAIN, swaying, tube_dress
+
+UNCAPTURED = 1  # step in single operations; three on a GPU, which compile
 
 
 def made(recipe, kind="snug", trainer=Trainer):
@@ -46,6 +48,7 @@ def overwrite(held, new):
 
 def capturing(monkeypatch, recipe, **options):
     """A trainer whose step is captured, and one that takes the same steps in single operations."""
+    monkeypatch.setattr(captured_step, "UNCAPTURED", UNCAPTURED)
     plain = made(recipe, **options)
     for module in ("captured_step", "contact_cache_torch"):
         monkeypatch.setattr(f"snug.training.{module}.CudaGraph", Replayed)
