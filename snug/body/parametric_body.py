@@ -79,11 +79,6 @@ class Body:
 
         Raises:
             BodyError: another number of coefficients, or one that is not finite.
-
-        >>> body = Body.load()
-        >>> tall = body.shaped([1.0] + [0.0] * 9)
-        >>> bool(tall[:, 1].max() > body.template[:, 1].max())
-        True
         """
         if betas is None:
             return self.template.copy()

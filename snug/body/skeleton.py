@@ -89,10 +89,6 @@ def joint_positions(poses: np.ndarray, translations: np.ndarray) -> np.ndarray:
     """Return where the joints are, (T, 24, 3) [m], by forward kinematics.
 
     poses: (T, 24, 3) [rad]. translations: (T, 3) [m] of the root.
-
-    >>> import numpy as np
-    >>> joint_positions(np.zeros((1, 24, 3)), np.zeros((1, 3)))[0, JOINT["left_knee"]]
-    array([0.13, 0.51, 0.02])
     """
     return _positions(global_rotations(poses), np.asarray(translations), REST_JOINTS)
 

@@ -19,10 +19,6 @@ def joint_transforms(
     rotation is W_j = W_parent R_j, the posed joint q_j = q_parent + W_parent (p_j - p_parent), and the
     transform x -> W_j (x - p_j) + q_j. The root is at q_0 = p_0 + translation (..., 3) [m]; its parent is -1,
     and parents come before their children.
-
-    >>> rest = torch.zeros(1, 3)
-    >>> joint_transforms(torch.eye(3)[None], rest, [-1], torch.tensor([0.0, 0.0, 1.0]))[0, :, 3]
-    tensor([0., 0., 1.])
     """
     world: list[Tensor] = []
     posed: list[Tensor] = []
@@ -83,10 +79,6 @@ def unskin_damped(posed: Tensor, rest: Tensor, weights: Tensor, transforms: Tens
     Where joints turned far from each other blend to a map that is nearly singular, as in an armpit, what
     `unskin` returns may lie metres away, and means nothing in any other pose. The damping is to be seen
     beside 1, the square of the stretch of a rotation. Shapes as in `skin`; rest (V, 3) [m].
-
-    >>> shift = torch.cat([torch.eye(3), torch.tensor([[0.0], [1.0], [0.0]])], dim=1)[None]
-    >>> unskin_damped(torch.tensor([[1.0, 1.0, 0.0]]), torch.zeros(1, 3), torch.ones(1, 1), shift, 1.0)
-    tensor([[0.5000, 0.0000, 0.0000]])
     """
     linear = _blended(weights, transforms)[..., :3]
     missing = posed - skin(rest, weights, transforms)

@@ -1,8 +1,4 @@
-"""Garment on a body: triangles, named openings, and per vertex the body vertex and skinning weights.
-
-The T-pose shape of a garment is its rest shape, unless it has a UV chart: areas, Dm^-1, masses and hinges all
-come from one of the two.
-"""
+"""Garment on a body: triangles, named openings, and per vertex the body vertex and skinning weights."""
 
 from __future__ import annotations
 
@@ -53,7 +49,7 @@ class Garment:
         parameters: of the tailoring.
         material: of the cloth.
         rest_uv: (F,3,2) [m] of the faces' corners, the flat rest state of a garment that has one; else
-            rest_positions is its rest shape too.
+            rest_positions is its rest shape too. Areas, masses and hinges all come from one of the two.
     """
 
     name: str

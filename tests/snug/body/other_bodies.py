@@ -74,10 +74,8 @@ def with_hands(arrays: dict[str, np.ndarray], face: bool) -> dict[str, np.ndarra
         for finger in range(5):
             first = len(parents)
             parents += [wrist, first, first + 1]
-            aside = (finger - 2) * 0.1 * (regressor[hand] - regressor[wrist])
-            joints += [
-                regressor[hand] + aside + k * 0.1 * (regressor[hand] - regressor[wrist]) for k in range(3)
-            ]
+            bone = 0.1 * (regressor[hand] - regressor[wrist])
+            joints += [regressor[hand] + (finger - 2 + k) * bone for k in range(3)]
             shares += [weights[:, hand] / 15] * 3
     table = np.stack([np.array(parents), np.arange(len(parents))]).astype(np.uint32)
     return {**arrays, "J_regressor": np.stack(joints), "weights": np.stack(shares, 1), "kintree_table": table}
