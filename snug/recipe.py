@@ -48,32 +48,27 @@ class Recipe:
         h0_sigma: standard deviation of the initial hidden state in training (0 at run time always).
         remembered: add that noise to the state which the network last had after the frame before (see
             snug.training.training_set), instead of to zero. Not for networks that learn simulated
-            vertices, nor where each window gets its own shape (`shape_of`); of little use where
-            `window_stride` is no divisor of `window`, for then few frames before a window ever end one.
+            vertices, nor where each window gets its own shape (`shape_of`).
         window: frames of a sub-sequence.
         batch: sub-sequences of a step.
         window_stride: frames between the starts of two sub-sequences (equal to `window`: none overlap); a
             network of single frames learns from each frame whatever it is.
-        even: passes n of an epoch: pass k takes the sub-sequences k, k + n, k + 2n, ... of all motions.
-            With 1 the order is random, and a hard pose may first appear after the network has settled,
-            with a loss of joules.
+        even: passes n of an epoch: pass k takes the sub-sequences k, k + n, k + 2n, ... of all motions,
+            so that no hard pose first appears after the network has settled. With 1 the order is random.
         shape_range: bodies get shape numbers from U(-r, r).
         shape_of: receivers of a shape: each `window` in each step anew, as the paper has it, or each
-            augmented `clip` once, while original motions stay on the mean body: all that is known of a frame
-            (its posed body, its anchors, the state before it) then stays true.
+            augmented `clip` once, while original motions stay on the mean body.
         shape_share: share of these clips that leave the mean body.
         contact_samples: `all` (vertices, edge midpoints, centroids) or `vertices`.
         contact_stiffness: of ContactPenalty, per area of cloth [J/m^5]; None takes the simulator's default.
         contact_margin: of ContactPenalty; None takes the simulator's default.
         mixed: frames of augmented motions (snug.training.augmentation) for each frame of a
             training motion, up to 20,000; not for networks that learn simulated vertices.
-        terms: energies in the loss, TERMS or any other energy of the simulator by its name, see
-            snug.recipe. Leaving one out is an ablation, and it is then never evaluated.
+        terms: energies in the loss, TERMS or any other that `find_energy` knows.
         inertia_form: `equation_5` (the inertia of each frame with two before it in its window, through
             which its gradient reaches all three), `detached_past` (the same without a gradient to the two
             frames before, as in Neural Cloth Simulation and GAPS) or `two_transitions` (the published code of
             SNUG's authors: the second frame has an inertia too, about a cloth that stood still before it).
-            A window's inertia is the mean over the frames that have one.
         material: `stvk`, `springs` (mass-spring edges in place of the StVK membrane, all else the same) or
             `pbns` (edges, hinges, uniform mass and squared contact of PBNS, see
             snug.training.physics_loss, with its own stiffness and margin of contact).
@@ -135,16 +130,12 @@ class Recipe:
         if min(self.window, self.batch, self.window_stride, self.even) < 1:
             raise RecipeError("recipe options window, batch, window_stride and even must be at least 1")
         if "inertia" in self.terms and self.window < 3:
-            raise RecipeError(
-                "recipe option window: inertia needs two frames before the one it judges, so >= 3"
-            )
+            raise RecipeError("recipe option window: inertia needs two frames before its own, so >= 3")
         for option in ("smoothing", "weight_decay", "h0_sigma", "shape_range", "shape_share", "mixed"):
             if not getattr(self, option) >= 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must not be negative")
         if self.shape_of == "clip" and self.shape_range and not self.mixed:
-            raise RecipeError(
-                "recipe option shape_of='clip': mixed clips get the shapes, so mixed above zero"
-            )
+            raise RecipeError("recipe option shape_of='clip': mixed clips get the shapes, so mixed > 0")
         if self.shape_share > 1.0:
             raise RecipeError(f"recipe option shape_share={self.shape_share}: a share, so at most 1")
         for option in ("learning_rate", "adam_epsilon", "output_scale", "spike"):

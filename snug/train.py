@@ -110,9 +110,7 @@ def choose_motions(
 ) -> tuple[list[Motion], list[Motion]]:
     """Return the motions to train on and those to validate with. Raises ValueError for an unknown name.
 
-    Args:
-        options: of the command line.
-        simulated: motions of a data set, which take the place of the library's.
+    The simulated motions of a data set take the place of the library's.
     """
     from snug.motion.files import load_motions
     from snug.motion.library import CONTROL, DYNAMIC_VALIDATION, TRAIN, VALIDATION, make_motion

@@ -1,8 +1,7 @@
 """Network and skinning of one frame as one compiled call, laid out by snug.networks.frame_layout.
 
 A frame alone is one pass over all weights, matrix after matrix: its time is that of fetching them. So each
-matrix lies in one piece, in the order of use, float32. tests/snug/networks/test_frame_layout.py compares them
-with torch.
+matrix lies in one piece, in the order of use, float32.
 """
 
 from __future__ import annotations

@@ -94,16 +94,11 @@ class DressedBody:
         feature_set: str = "motion",
         still: bool = False,
     ) -> Tensor:
-        """Return the inputs (T, D) of a network, float32.
+        """Return the inputs (T, D) of a network, float32; `still`: as if each pose were held.
 
-        Args:
-            motion: its poses, translations and frame rate.
-            recipe: gives the form of the pose and the axes of the velocity.
-            betas: shape numbers; None is the mean body.
-            feature_set: `pose`; `motion`: pose, root velocity and shape; `pose_shape`: pose and shape, with
-                zeros behind it up to SHAPES numbers; `joint_motion`: pose and rates of single joints
-                (snug.networks.ncs), whatever the recipe says.
-            still: as if each pose were held, whatever came before it.
+        Sets are `pose`; `motion`: pose, root velocity and shape; `pose_shape`: pose and shape, with zeros
+        behind it up to SHAPES numbers; `joint_motion`: pose and rates of single joints (snug.networks.ncs).
+        The recipe gives the form of the pose and the axes of the velocity.
         """
         if feature_set == "joint_motion":
             pose, rates = joint_motion(self.body, motion, betas)

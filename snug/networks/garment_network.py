@@ -152,11 +152,7 @@ def initialise(network: nn.Module, rules: str) -> None:
     recurrent layer takes its units for inputs. Keras' rules: input weights uniform within
     sqrt(6 / (inputs + outputs)) (Glorot and Bengio 2010), where a recurrent layer of H units counts 3 H
     outputs, one for each of its gates; recurrent weights (3H, H) with orthonormal columns; biases zero. They
-    are drawn from torch's global generator.
-
-    Args:
-        network: newly made; changed in place by Keras' rules.
-        rules: one of snug.recipe.INITIALISATIONS.
+    are drawn from torch's global generator. rules: one of snug.recipe.INITIALISATIONS.
     """
     if rules == "torch":
         return

@@ -201,18 +201,9 @@ def prepare_frames(
 ) -> Callable[[], Iterator[np.ndarray]]:
     """Return a function that starts the frames of `roll_out`, each (V, 3) [m], computed when asked for.
 
-    Inputs and joint transforms are made, and the network warmed up, before this returns.
-
-    Args:
-        model: a trained network; None skins alone, by the weights of the default recipe.
-        dressed: body and garment.
-        motion: T frames.
-        betas: shape numbers of the body.
-        earlier: the motion before this one, or None. The inputs know it, and the roll-out starts from the
-            state that it leaves.
-
-    Raises:
-        RollOutError: if the model does not fit.
+    Inputs and joint transforms are made, and the network warmed up, before this returns. The inputs know the
+    motion `earlier`, and the roll-out starts from the state that it leaves. Without a model it is skinning
+    alone, by the weights of the default recipe. Raises RollOutError if the model does not fit.
     """
     features, network, recipe = np.empty((motion.frames, 0), np.float32), None, DEFAULT
     if model is not None:

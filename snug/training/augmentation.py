@@ -77,10 +77,7 @@ def augment(motions: Sequence[Motion], recipe: Recipe, *, vertices: int, seed: i
 def make_shared_clips(motions: Sequence[Motion], share: int, *, vertices: int) -> list[Motion]:
     """Return clips to simulate for the trainings of all seeds, mixed as the default recipe does.
 
-    Args:
-        motions: the original training motions.
-        share: augmented frames for each original one. The clips of a smaller share are the first of a larger.
-        vertices: number of the garment's vertices.
+    share: augmented frames for each original one. The clips of a smaller share are the first of a larger.
     """
     return augment(motions, replace(DEFAULT, mixed=float(share)), vertices=vertices, seed=SHARED_SEED)
 

@@ -32,11 +32,8 @@ MARKED = 25  # every so many vertices of the patch there is a mark
 class BodyPatches:
     """The patch of a body in every frame of a training set.
 
-    Args:
-        data: the training set.
-        cache: anchors on the patch; those of a ContactCache lie on arrays that kernels pose, others on
-            tensors that torch poses on the set's device.
-        kept: whether each frame has one body for good; the kernels then pose them all once.
+    Anchors of a ContactCache lie on arrays that kernels pose, others on tensors that torch poses on the set's
+    device. kept: whether each frame has one body for good; the kernels then pose them all once.
     """
 
     def __init__(self, data: TrainingSet, cache: ContactCache | TensorContactCache, *, kept: bool) -> None:

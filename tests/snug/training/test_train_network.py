@@ -1,4 +1,4 @@
-"""Training lowers the physics, repeats bit for bit, survives files, and names what goes wrong."""
+"""Training follows its recipe, survives files, and names what goes wrong."""
 
 from dataclasses import replace
 
@@ -21,14 +21,6 @@ def short(kind="snug", *, steps=60, seed=0, recipe=PLAIN, motions=None, **option
     clips = motions or [swaying(30)]
     options = {"progress": False, "every": 10, **options}
     return train_network(kind, tube_dress(), clips, steps=steps, seed=seed, recipe=recipe, **options)
-
-
-def test_training_lowers_the_potential():
-    trained = short(steps=100)
-    first, last = trained.history[0], trained.history[-1]
-    assert last["loss"] < 0.9 * first["loss"] and last["strain"] < first["strain"]
-    parts = sum(last[term] for term in DEFAULT.terms)
-    assert last["loss"] == pytest.approx(parts, rel=1e-6) and last["step"] == 100
 
 
 @pytest.mark.parametrize(
