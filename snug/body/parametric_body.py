@@ -10,13 +10,13 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from reference_sim.files.array_file import read_arrays
-from snug.body.skeleton import JOINT_NAMES, BodyError, joint_transforms, rotation_matrices
+from snug.body.skeleton import BodyError, joint_transforms, rotation_matrices
 
 BODY_FILE = Path(__file__).resolve().parent.parent / "data" / "body.npz"
 SHAPES = 10  # shape coefficients kept when a file has more, and read by networks of pose and shape
@@ -37,7 +37,6 @@ class Body:
         parents: (24,), -1 for the root.
         pose_directions: None, or (B, 3, 9 K) [m]: pose correctives, for one unit of each entry of R - I, row
             by row, of the rotations R of joints 1 to K relative to their parents.
-        joint_names: 24 names, the same for every body.
 
     Source:
         M. Loper et al., SMPL: a skinned multi-person linear model, ACM Transactions on Graphics 34 (2015),
@@ -52,7 +51,6 @@ class Body:
     faces: NDArray[np.int64]
     parents: NDArray[np.int64]
     pose_directions: NDArray[np.float64] | None = None
-    joint_names: ClassVar[tuple[str, ...]] = JOINT_NAMES
 
     @staticmethod
     def load() -> "Body":

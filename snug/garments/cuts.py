@@ -4,9 +4,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from reference_sim.geometry.topology import boundary_loops
+from reference_sim.geometry.topology import Array, Index, boundary_loops
 from snug.body.parametric_body import Body
 from snug.garments.implicit_surface import (
     GRID_SPACING,
@@ -16,9 +15,6 @@ from snug.garments.implicit_surface import (
     joint_position,
     skin_following,
 )
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 SEAM = "seam"  # the cut at x = 0, where the half is mirrored
 # [m] in z: a bent cut is a parabola so far and level from twice as far, or it would reach a heavy chest.

@@ -7,20 +7,17 @@ from dataclasses import dataclass, field
 
 import igl
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
 from scipy.spatial import cKDTree
 
 from reference_sim.cloth import Cloth
 from reference_sim.geometry.closest_point import FaceSearch
-from reference_sim.geometry.topology import boundary_loops, edge_uses, half_edges
+from reference_sim.geometry.topology import Array, Index, boundary_loops, edge_uses, half_edges
 from reference_sim.material import Material
 from snug.body.parametric_body import Body
 from snug.body.skeleton import JOINT_NAMES
 from snug.garments.implicit_surface import joint_position, skin_following
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 SHAPE_SMOOTHING = 10  # rounds over a shape's displacement: nearest vertices jump from leg to leg
 # Rounds over the weights at 1000 vertices of cloth that spans both thighs: between them it follows neither.

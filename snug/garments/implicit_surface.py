@@ -25,8 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from reference_sim.geometry.topology import edge_uses
+from reference_sim.geometry.topology import Array, Index, edge_uses
 from snug.body.parametric_body import Body
+from snug.body.skeleton import JOINT
 
 TORSO_BONES = ("pelvis", "left_hip", "right_hip", "spine1", "spine2", "spine3", "left_collar", "right_collar")
 # Joints whose weights a shirt may borrow: never hands, head or shins, even where they come near.
@@ -38,17 +39,14 @@ CROTCH_BONES = ("pelvis", "left_hip", "right_hip")
 
 def skin_following(body: Body, names: Sequence[str]) -> NDArray[np.bool_]:
     """Return which body vertices (B,) have one of the joints `names` as their strongest skinning weight."""
-    wanted = [body.joint_names.index(name) for name in names]
+    wanted = [JOINT[name] for name in names]
     return np.isin(np.argmax(body.skinning_weights, axis=1), wanted)
 
 
-def joint_position(body: Body, name: str) -> NDArray[np.float64]:
+def joint_position(body: Body, name: str) -> Array:
     """Return the rest position (3,) [m] of the joint called `name`."""
-    return np.asarray(body.joint_template, dtype=np.float64)[body.joint_names.index(name)]
+    return body.joint_template[JOINT[name]]
 
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 GRID_SPACING = 0.012  # [m] grid of the surface: finer than any cloth edge that the tests ask for
 SUPPORT_DIRECTIONS = 64  # support directions of a convex section: 0.1 % of girth

@@ -15,13 +15,17 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from reference_sim.geometry.surface import vertex_normals
-from reference_sim.geometry.topology import boundary_loops, corner_angles, half_edges, triangle_areas
+from reference_sim.geometry.topology import (
+    Array,
+    Index,
+    boundary_loops,
+    corner_angles,
+    half_edges,
+    triangle_areas,
+)
 from snug.body.parametric_body import Body
 from snug.garments.cuts import SEAM, CutPlane, cut_sheet, outlines
 from snug.garments.implicit_surface import SHIRT_BONES, ImplicitSurface, skin_following
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 # Triangles pull with their area to this power. Power 1 (Lloyd's iteration) left areas of 0.45 to 2.0 of the
 # mean at 2000 to 8000 vertices, power 3 leaves 0.52 to 1.9; it needs the short step, a full one oscillates.

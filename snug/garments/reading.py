@@ -7,7 +7,6 @@ from itertools import product
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from reference_sim.cloth import Cloth
 from reference_sim.files.mesh_files import (
@@ -19,6 +18,7 @@ from reference_sim.files.mesh_files import (
     rest_chart,
     to_metres_y_up,
 )
+from reference_sim.geometry.topology import Array, Index
 from reference_sim.material import Material
 from reference_sim.obstacle import Obstacle
 from snug.body.parametric_body import Body
@@ -32,9 +32,6 @@ from snug.garments.garment import (
     piece_of_faces,
 )
 from snug.garments.implicit_surface import skin_following
-
-Array = NDArray[np.float64]
-Index = NDArray[np.int64]
 
 TRAPPED_DEPTH = 0.02  # [m] below the skin, from which contact may not find the way out
 TRAPPED_SHARE = 0.05  # of the vertices that may be so deep

@@ -14,6 +14,7 @@ from reference_sim.energies import BendHinge, StretchStVK
 from reference_sim.material import Material
 from snug import check
 from snug import train as train_command
+from snug.body.skeleton import JOINT
 from snug.file_options import GarmentFile, parse_garment_file
 from snug.garments.garment import GarmentError
 from snug.garments.reading import read_garment
@@ -103,7 +104,7 @@ def test_a_skirt_is_held_by_its_waist_and_follows_neither_leg(tmp_path, body):
     assert set(read.loops) == {"waist", "hem"}
     np.testing.assert_array_equal(read.pins, skirt.pins)
     middle = np.abs(read.rest_positions[read.hem, 0]) < 0.02
-    left, right = (read.skinning_weights[read.hem][middle, body.joint_names.index(f"{side}_hip")]
+    left, right = (read.skinning_weights[read.hem][middle, JOINT[f"{side}_hip"]]
                    for side in ("left", "right"))  # fmt: skip
     assert np.abs(left - right).max() < 0.2 and min(left.min(), right.min()) > 0.2
 

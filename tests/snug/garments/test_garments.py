@@ -8,6 +8,7 @@ import pytest
 import scipy.sparse as sp
 
 from snug.body.parametric_body import Body
+from snug.body.skeleton import JOINT
 from snug.garments.cuts import neck_cut
 from snug.garments.garment import GarmentError
 from snug.garments.templates import GARMENT_TEMPLATES, find_template
@@ -44,7 +45,7 @@ def shirt(request, wardrobe):
 
 
 def at(body, name):
-    return body.joint_template[body.joint_names.index(name)]
+    return body.joint_template[JOINT[name]]
 
 
 SLEEVES = {"neck", "left_sleeve", "right_sleeve", "hem"}
@@ -181,7 +182,7 @@ def test_legs_are_as_long_as_asked_and_each_follows_its_own(body, wardrobe):
         below = points[name][:, 1] < crotch[name] - 0.05
         assert np.abs(points[name][below, 0]).min() > 0.005  # apart
         weights = wardrobe[name].skinning_weights[below & (points[name][:, 0] > 0)]
-        foreign = [body.joint_names.index(f"right_{joint}") for joint in ("hip", "knee")]
+        foreign = [JOINT[f"right_{joint}"] for joint in ("hip", "knee")]
         assert weights[:, foreign].max() < 0.2 and np.allclose(weights.sum(axis=1), 1.0)
 
 
@@ -190,7 +191,7 @@ def test_arms_are_bare_or_covered_to_the_wrist(body, wardrobe):
     long, top = wardrobe["long_sleeves"], wardrobe["tank_top"]
     cuff = shoulder + long.parameters["sleeve"] * (wrist - shoulder)
     assert long.rest_positions[:, 0].max() == pytest.approx(cuff, abs=1e-4)
-    assert body.joint_names.index("left_elbow") in np.argmax(long.skinning_weights, axis=1)
+    assert JOINT["left_elbow"] in np.argmax(long.skinning_weights, axis=1)
     armhole = top.rest_positions[top.loops["left_armhole"]]
     assert np.ptp(armhole[:, 1]) > 0.12 and armhole[:, 0].max() < shoulder + 0.1
 
@@ -225,7 +226,7 @@ def test_every_kind_fits_another_body_and_can_be_simulated(body, kind, other):
 
 def test_a_neck_is_cut_above_high_shoulders(body):
     """Lower neck joint by 4 cm: then the shoulders are as high beside it as they are on other bodies."""
-    joints, index = body.joint_template.copy(), body.joint_names.index("neck")
+    joints, index = body.joint_template.copy(), JOINT["neck"]
     joints[index, 1] -= 0.04
     low = dataclasses.replace(body, joint_template=joints)
     neck = neck_cut(low, 0.015)

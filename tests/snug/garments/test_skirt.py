@@ -12,6 +12,7 @@ from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.ground_truth import simulate_quasi_static
 from reference_sim import Trajectory
+from snug.body.skeleton import JOINT
 from snug.garments.templates import find_template
 from snug.motion.library import make_motion
 from snug.networks.dressed_body import DressedBody
@@ -45,7 +46,7 @@ def test_a_skirt_fits_waist_and_hips_and_has_two_even_rims(body, skirt):
     assert np.array_equal(skirt.pins, np.sort(skirt.loops["waist"]))
     distance = igl.signed_distance(points, body.template, body.faces)[0]
     waist, hem = (points[skirt.loops[name]] for name in ("waist", "hem"))
-    hip, knee = (body.joint_template[body.joint_names.index(n), 1] for n in ("left_hip", "left_knee"))
+    hip, knee = (body.joint_template[JOINT[n], 1] for n in ("left_hip", "left_knee"))
     assert np.ptp(waist[:, 1]) < 1e-4 and np.ptp(hem[:, 1]) < 1e-4 and knee < hem[0, 1] < hip < waist[0, 1]
     assert distance[skirt.pins].max() < 0.012  # the band lies close
     levels = np.linspace(hem[0, 1], waist[0, 1], 10)[1:-1]
@@ -56,7 +57,7 @@ def test_a_skirt_fits_waist_and_hips_and_has_two_even_rims(body, skirt):
 def test_between_the_thighs_a_skirt_follows_both(body, skirt):
     """The jump from leg to leg that borrowed weights have is gone; at the sides it follows its own thigh."""
     x, w = skirt.rest_positions[:, 0], skirt.skinning_weights
-    left, right = (w[:, body.joint_names.index(f"{side}_hip")] for side in ("left", "right"))
+    left, right = (w[:, JOINT[f"{side}_hip"]] for side in ("left", "right"))
     hem = np.isin(np.arange(len(x)), skirt.hem)
     middle, side = hem & (np.abs(x) < 0.02), hem & (x > 0.25)
     assert np.abs(left - right)[middle].max() < 0.15 and (left - right)[side].min() > 0.3

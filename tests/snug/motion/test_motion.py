@@ -5,7 +5,6 @@ import pytest
 
 from snug.body.skeleton import (
     JOINT,
-    JOINT_NAMES,
     PARENTS,
     REST_JOINTS,
     axis_angles,
@@ -213,7 +212,6 @@ def test_place_faces_forward_on_the_floor():
 
 class TestSkeleton:
     def test_is_the_bodys(self, body):
-        assert body.joint_names == JOINT_NAMES
         assert tuple(body.parents) == PARENTS
         np.testing.assert_allclose(REST_JOINTS, body.joints(), atol=0.01)
 
