@@ -222,27 +222,15 @@ def gone(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
         other: rows of the later run.
     """
     keys = [frame.set_index(CELL).index for frame in (one, other)]
-    missing = one[~keys[0].isin(keys[1])]
-    cells = other.set_index(CELL[:3]).index
-    whole = ~missing.set_index(CELL[:3]).index.isin(cells)
-    changes = [
-        Change(GONE, _list(rows["place"]), str(method), "all metrics", _size(rows))
-        for method, rows in missing[whole].groupby("method", sort=False)
-    ]
-    return changes + [
-        Change(GONE, _list(rows["place"]), str(method), str(metric), _size(rows))
-        for (method, metric), rows in missing[~whole].groupby(["method", "metric"], sort=False)
-    ]
-
-
-def _list(names: pd.Series) -> str:
-    return ", ".join(dict.fromkeys(map(str, names)))
-
-
-def _size(rows: pd.DataFrame) -> str:
-    scenes, seeds = rows["scene"].nunique(), sorted(rows["seed"].unique())
-    extent = f"{scenes} scene{'s' * (scenes > 1)}, seed{'s' * (len(seeds) > 1)} {', '.join(map(str, seeds))}"
-    return f"not in the later run: {extent}"
+    missing = one[~keys[0].isin(keys[1])].astype({"method": str, "metric": str})
+    lacking = missing.set_index(CELL[:3]).index.isin(other.set_index(CELL[:3]).index)
+    missing["metric"] = missing["metric"].where(lacking, "all metrics")
+    changes = []
+    for (method, metric), rows in missing.groupby(["method", "metric"], sort=False):
+        places, seeds = (", ".join(map(str, rows[name].unique())) for name in ("place", "seed"))
+        size = f"not in the later run: {rows['scene'].nunique()} scenes, seeds {seeds}"
+        changes.append(Change(GONE, places, method, metric, size))
+    return changes
 
 
 def endings(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:

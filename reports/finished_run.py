@@ -53,15 +53,9 @@ class RollOuts:
             problem = f"{path}: holds no whole frame"
         except (TrajectoryError, ValueError, OSError) as error:
             problem = str(error)
-        problem = without_folder(self.folder, problem)
         if problem not in self.problems:  # the page reads again what was drawn
             self.problems.append(problem)
         return None
-
-
-def without_folder(folder: RunFolder | None, problem: object) -> str:
-    """Return the sentence with paths as seen from the folder of the run."""
-    return str(problem).replace(f"{folder.path}/", "") if folder else str(problem)
 
 
 COMPARED = ("scene", "method", "metric")  # columns kept as categories, which are compared much faster

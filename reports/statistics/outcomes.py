@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Collection
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -87,34 +86,19 @@ MOST_EXTERNAL = 3  # of these that page one shows
 
 
 def leads(run: Run, rows: pd.DataFrame) -> list[str]:
-    """Choose the methods of page one that these rows have: reference, subjects, another network, a baseline.
+    """Choose the methods of page one that these rows have.
 
-    The other network is the paper's rival of SNUG, or the first where that did not run. Ablations count as
-    networks where a run has no others.
+    They are the reference, SNUG (or SNUG by another recipe, or another network), roll-outs of the user, the
+    paper's rival or another network, and a baseline. Ablations count as networks where a run has no others.
     """
     have = set(rows[rows["usable"]]["method"])
-    first = subjects(run, have)
-    others = [name for name in _networks(run, have) if name not in first]
-    other = RIVAL if RIVAL in others else next(iter(others), "")
-    baseline = next((name for name in run.with_role("baseline") if name in have), "")
-    return [name for name in (run.reference, *first, other, baseline) if name in have]
-
-
-def subjects(run: Run, have: Collection[str]) -> list[str]:
-    """Return the methods, of those in `have`, that page one is about: SNUG, and roll-outs of the user.
-
-    Where there is none, SNUG by another recipe takes its place, or another network.
-    """
-    networks = _networks(run, have)
-    recipes = [name for name in networks if name.startswith(NETWORK)]
-    first = NETWORK if NETWORK in networks else next(iter(recipes or networks), "")
-    external = [name for name in run.with_role(EXTERNAL) if name in have]
-    return [name for name in (first, *external[:MOST_EXTERNAL]) if name]
-
-
-def _networks(run: Run, have: Collection[str]) -> list[str]:
     learned = [name for name in run.with_role(*LEARNED) if name in have]
-    return [name for name in learned if not run.methods[name].base] or learned
+    networks = [name for name in learned if not run.methods[name].base] or learned
+    first = min(networks, key=lambda name: (name != NETWORK, not name.startswith(NETWORK)), default="")
+    external = [name for name in run.with_role(EXTERNAL) if name in have][:MOST_EXTERNAL]
+    other = min((name for name in networks if name != first), key=lambda name: name != RIVAL, default="")
+    baseline = next((name for name in run.with_role("baseline") if name in have), "")
+    return [name for name in (run.reference, first, *external, other, baseline) if name in have]
 
 
 PUBLISHED = Path(__file__).resolve().parents[1] / "published"

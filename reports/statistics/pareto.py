@@ -41,7 +41,7 @@ class Point:
     fewer: str = ""
 
 
-def points_of(run: Run, frame: pd.DataFrame, scenes: Sequence[str], metric: str, x: str = "") -> list[Point]:
+def points_of(run: Run, frame: pd.DataFrame, scenes: Sequence[str], metric: str) -> list[Point]:
     """Return a point for each method that has both numbers in all the scenes and seeds.
 
     Args:
@@ -49,12 +49,11 @@ def points_of(run: Run, frame: pd.DataFrame, scenes: Sequence[str], metric: str,
         frame: rows of it.
         scenes: over which means are taken, over seeds too that came through all of them.
         metric: of the error.
-        x: metric in place of the run time.
     """
     rows = frame[frame["scene"].isin(list(scenes))]
-    x = x or run_time(rows)
+    x = run_time(rows)
     measured = rows[rows["usable"] & rows["metric"].isin([metric, x])].groupby(["method", "seed"]).size()
-    whole = measured.index[measured == len(scenes) * len({metric, x})]
+    whole = measured.index[measured == 2 * len(scenes)]
     in_all = rows.set_index(["method", "seed"]).index.isin(whole)
     rows = rows.assign(usable=rows["usable"] & in_all)
     rows = rows[rows["metric"].isin([metric, x, TIME, REPEATS]) | ~rows["usable"]]
@@ -65,7 +64,7 @@ def points_of(run: Run, frame: pd.DataFrame, scenes: Sequence[str], metric: str,
         if time is None or error is None:
             continue
         spread = 2.0 * (time.spread or 0.0)
-        if repeats is not None and inference is not None and x in (TIME, WHOLE):
+        if repeats is not None and inference is not None:
             spread = inference.value * repeats.value / 100.0
         points.append(
             Point(method, time.value, error.value, spread, error.spread_or_uncertainty or 0.0, error.fewer)
@@ -176,8 +175,8 @@ def rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
     return list(dict.fromkeys(names))
 
 
-def compared_scenes(run: Run, frame: pd.DataFrame) -> dict[str, list[str]]:
-    """Return garment -> scenes in which SNUG was timed beside a truncated solver.
+def compared_scenes(run: Run, frame: pd.DataFrame) -> list[str]:
+    """Return the scenes of the first garment in which SNUG was timed beside a truncated solver.
 
     Those of suite speed where there are any: whole motions have no energy gap.
     """
@@ -186,7 +185,7 @@ def compared_scenes(run: Run, frame: pd.DataFrame) -> dict[str, list[str]]:
     both = set(timed[timed["method"] == NETWORK]["scene"]) & set(timed[timed["method"].isin(levels)]["scene"])
     rows = timed[timed["scene"].isin(both)]
     of_speed = rows[rows["suite"] == "speed"]
-    return run.garments(of_speed if len(of_speed) else rows)
+    return next(iter(run.garments(of_speed if len(of_speed) else rows).values()), [])
 
 
 def reference_scenes(run: Run) -> list[str]:
@@ -195,4 +194,4 @@ def reference_scenes(run: Run) -> list[str]:
     Those of suite speed in which SNUG was timed beside a truncated solver; without any, all whole motions.
     """
     clips = compared_scenes(run, run.cells("speed"))
-    return next(iter((clips or run.garments(run.garment_rows)).values()), [])
+    return clips or next(iter(run.garments(run.garment_rows).values()), [])

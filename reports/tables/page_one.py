@@ -45,7 +45,7 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     garment = run.first_garment
     rows_of_garment = run.garment_rows[run.garment_rows["garment"] == garment]
     cells = run.cells("speed", "garments")
-    scenes = next(iter(compared_scenes(run, cells).values()), [])
+    scenes = compared_scenes(run, cells)
     timed = cells[cells["scene"].isin(scenes)] if scenes else rows_of_garment
     rows_of_garment = timed if rows_of_garment.empty else rows_of_garment  # of a run of suite speed alone
     plain = set(rows_of_garment[rows_of_garment["usable"]]["method"]) - run.standing_apart(rows_of_garment)
@@ -109,7 +109,7 @@ OF_STEPS = ("energy/strain", "dynamics/amplitude")  # what the time step changes
 def error_rivals(run: Run) -> list[Table]:
     """Tabulate, for each error, the best method no slower than SNUG and the fastest solver as accurate."""
     frame = run.cells("speed", "garments")
-    scenes = next(iter(compared_scenes(run, frame).values()), [])
+    scenes = compared_scenes(run, frame)
     lines: list[tuple[Cell, ...]] = []
     for metric in RIVAL_ERRORS:
         points = points_of(run, frame, scenes, metric) if metric in run.metrics else []

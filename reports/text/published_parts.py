@@ -167,7 +167,7 @@ def front_sentences(run: Run) -> str:
     rows = with_relative_excess(run, worn)
     snug, pbns, supervised = (excess_of(run, rows, name) for name in (NETWORK, "pbns", "supervised"))
     swing, alike = (mean_of(worn, NETWORK, name) for name in (SWING, ALIKE))
-    scenes = next(iter(compared_scenes(run, cells).values()), [])
+    scenes = compared_scenes(run, cells)
     timed = cells[cells["scene"].isin(scenes)]
     points = points_of(run, cells, scenes, "gap/energy")
     network = next((point for point in points if point.method == NETWORK), None)

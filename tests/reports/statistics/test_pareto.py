@@ -6,7 +6,6 @@ import dataclasses
 
 import pytest
 
-from reports.figures.charts import error_of_page_one
 from reports.statistics.pareto import (
     Point,
     beaten_by,
@@ -108,21 +107,10 @@ def test_run_time_is_from_pose_to_vertices_where_every_timed_cell_has_that(tmp_p
         run = run_of([*rows, *added])
         cells = run.cells("speed")
         scene = cells[cells["scene"] == SCENES[0]]
-        (point,) = (
-            p
-            for p in points_of(run, scene, SCENES[:1], "gap/energy", run_time(scene))
-            if p.method == "skinning"
-        )
+        points = points_of(run, scene, SCENES[:1], "gap/energy")
+        (point,) = (p for p in points if p.method == "skinning")
         assert point.time == pytest.approx(0.1 + shift) and point.time_spread == pytest.approx(0.05)
         assert run_time(scene) == ("cost/whole" if shift else "cost/frame")
-
-
-def test_a_caption_speaks_of_a_grey_band_only_where_one_is_seen():
-    unknown = [r for r in all_rows() if not r.method.startswith("simulation-") and r.metric != "gap/refrozen"]
-    tiny = [*unknown, row(SCENES[0], "simulation", "gap/refrozen", 1e-9, "J")]  # below the panel
-    for rows, grey in ((all_rows(), True), (unknown, False), (tiny, False)):
-        (drawing,) = error_of_page_one(run_of(rows))
-        assert ("Grey: within the reference's uncertainty." in drawing.caption) == grey
 
 
 def test_rivals_are_the_fastest_solvers_as_accurate():
