@@ -1,8 +1,7 @@
 """A body and the garment it wears, as tensors a network works on: inputs, joint transforms, skinned vertices.
 
-Everything a network or its loss sees is relative to the pelvis (the posed joint 0) of its own frame: the
-static energies do not depend on where a person stands, float32 keeps its digits, and the zero of gravity is
-the pelvis. World positions come back by adding the pelvis, in float64.
+Everything a network or its loss sees is relative to the pelvis (the posed joint 0) of its own frame, where
+float32 keeps its digits and the energy of gravity is zero. The pelvis is added in float64.
 """
 
 from __future__ import annotations

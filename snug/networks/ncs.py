@@ -4,8 +4,7 @@
 
 Nothing in the dynamic branch has a bias, and the motion of a body at rest is zero: where nothing has moved,
 z_d is zero and the garment is D(z_s). So the branches are apart by their form, without a loss of their own.
-In training a fifth of a batch has codes z_d of other windows (motion augmentation). These windows teach the
-decoder alone, and by the static energies alone.
+In training a fifth of a batch has codes z_d of other windows (motion augmentation).
 
 The inputs are of the joints near a garment:
 

@@ -127,9 +127,7 @@ class BodyPatches:
 REFRESH = 0.01
 # Frames before and after a searched one that may take over its anchors; at the start.
 REACH, FIRST_REACH = 3, 7
-# m: how far a mark of the body may have moved from a frame to one that takes over its anchors. At the start a
-# frame lies within FIRST_NEAR of the first and of the last of those; from those between it may be twice as
-# far.
+# m: how far a mark of the body may have moved from a frame to one that takes over its anchors; at the start.
 NEAR, FIRST_NEAR = 0.03, 0.07
 
 
@@ -190,8 +188,7 @@ class TrainingContact:
     def search_first(self, weights: Tensor) -> None:
         """Search where the skinned template touches, in enough frames to propagate to all others.
 
-        It comes before training: a thigh that is found in the hem only later meets, with joules, a network
-        that has long since settled. weights (V, 24): skinning weights of the garment.
+        It comes before training: a thigh found only later meets, with joules, a network that has settled.
         """
         data, frame, done = self.data, 0, 0
         while done < data.frames:

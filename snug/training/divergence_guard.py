@@ -84,8 +84,7 @@ class DivergenceGuard:
     def accepts(self, verdict: str, gradient_norm: float) -> bool:
         """Return whether the gradient of the batch, with that verdict, may be followed.
 
-        One that is not finite would ruin the weights, whatever the energies; the highest window is named.
-        Raises TrainingError as `judge` does.
+        One that is not finite would ruin the weights; the highest window is named. Raises as `judge` does.
         """
         if np.isfinite(gradient_norm):
             self.skipped_in_a_row = 0

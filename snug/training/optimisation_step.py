@@ -182,9 +182,8 @@ class Trainer:
     ) -> bool:
         """Search the anchors of windows (N, T) above the spike limit at once; return whether there are any.
 
-        An anchor of another frame, or of a garment that has moved on, can claim a contact that is none; so
-        can one that stood for being roughly right, hence the search is exact. Not where most windows are
-        high: then it is the network that is lost, and its vertices are no guide.
+        An old anchor can claim a contact that is none, and so can a rough one: hence the search is exact. Not
+        where most windows are high: then it is the network that is lost, and its vertices are no guide.
         """
         assert self.contact is not None
         if number < SETTLING:

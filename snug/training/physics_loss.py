@@ -221,11 +221,10 @@ class PhysicsLoss:
 
         Args:
             x: (N, T, V, 3) [m], each frame relative to its own pelvis p.
-            ahead: 2 p_{t-1} - p_{t-2} - p_t, (N, T, 3) [m]: where the pelvis would be if it kept its
-                velocity, relative to where it is.
-            behind: p_{t-1} - p_t, (N, T, 3) [m]; only the recipe's inertia_form `two_transitions` needs it.
+            ahead: 2 p_{t-1} - p_{t-2} - p_t, (N, T, 3) [m].
             planes: points and normals (N, T, S, 3) of the contact samples, or a kernel in lanes that knows
                 its planes; None leaves contact out.
+            behind: p_{t-1} - p_t, (N, T, 3) [m]; only the recipe's inertia_form `two_transitions` needs it.
         """
         if not (self.kernels and x.dtype == torch.float32):
             return self._definitions(x, ahead, planes, behind, {})

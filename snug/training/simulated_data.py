@@ -203,8 +203,7 @@ def smooth_offsets(offsets: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Return the low band of offsets (T, V, 3) [m]: diffused by sweeps with the uniform Laplacian.
 
     A vertex of an opening moves towards its neighbours along the opening alone, so that openings do not
-    shrink. Sweeps in proportion to the vertices reach the same length on any mesh. The rest shape, which no
-    band holds, is not smoothed.
+    shrink. Sweeps in proportion to the vertices reach the same length on any mesh.
     """
     from scipy.sparse import coo_array, diags_array  # a network of another kind trains without scipy
 

@@ -3,8 +3,7 @@
 A cache holds a recurrent network's state after each frame, which windows start from. A window of three frames
 says nothing of the state before it. Drawn from noise alone it is unlike any state of a roll-out, and the
 network learns to shake it off; cached when the frame before last ended a window, it is that of a roll-out,
-but for what the network has learned since. (With windows of three there are three such roll-outs of a motion,
-from its first, its second and its third frame.)
+but for what the network has learned since.
 """
 
 from __future__ import annotations
