@@ -10,13 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from snug.body.skeleton import JOINT, BodyError
 from snug.body.smpl_files import read_body
-from tests.snug.body.other_bodies import (
-    other_mesh,
-    plain_arrays,
-    smpl_arrays,
-    volume,
-    with_hands,
-)
+from tests.snug.body.other_bodies import other_mesh, plain_arrays, smpl_arrays, volume, with_hands
 
 
 @pytest.fixture(scope="module")

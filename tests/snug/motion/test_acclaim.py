@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from snug.body.skeleton import (
-    JOINT,
-    LEG_LENGTH,
-    global_rotations,
-    joint_positions,
-)
+from snug.body.skeleton import JOINT, LEG_LENGTH, global_rotations, joint_positions
 from snug.file_options import MotionFileOptions
 from snug.motion.acclaim import CMU_RATE, JOINT_BONES, read_amc, read_asf, read_asf_amc
 from snug.motion.retarget import LIMBS

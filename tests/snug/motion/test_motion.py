@@ -210,13 +210,10 @@ def test_place_faces_forward_on_the_floor():
     np.testing.assert_allclose(after, before, atol=1e-12)
 
 
-class TestSkeleton:
-    def test_is_the_bodys(self, body):
-        assert tuple(body.parents) == PARENTS
-        np.testing.assert_allclose(REST_JOINTS, body.joints(), atol=0.01)
-
-    def test_rest_soles_are_on_the_floor(self, body):
-        soles = sole_points(np.zeros((1, 24, 3)), np.zeros((1, 3)))[0]
-        np.testing.assert_allclose(soles[:, 1], 0.0, atol=1e-12)
-        for point in soles:  # each sole point lies under the foot
-            assert np.linalg.norm(body.template - point, axis=1).min() < 0.03
+def test_the_skeleton_is_the_bodys_and_its_soles_are_on_the_floor(body):
+    assert tuple(body.parents) == PARENTS
+    np.testing.assert_allclose(REST_JOINTS, body.joints(), atol=0.01)
+    soles = sole_points(np.zeros((1, 24, 3)), np.zeros((1, 3)))[0]
+    np.testing.assert_allclose(soles[:, 1], 0.0, atol=1e-12)
+    for point in soles:  # each sole point lies under the foot
+        assert np.linalg.norm(body.template - point, axis=1).min() < 0.03
