@@ -17,15 +17,13 @@ from reports.statistics.verdicts import measure_of, standing, untested
 from reports.tables.table import GARMENT, METHOD, SCENE, SUITE, Cell, Column, Table, table
 
 CLAIMS_NOTE = (
-    "Effect: × the first over the second, of geometric means over motions and seeds; of energies whose zero "
-    "is a choice, points of relative excess between the two; of frames, the first's share less half. Below "
-    "it the 95 % interval over motions and seeds, of costs the range; of points it is the interval on the "
-    "scale of the test, with the mean nearer to 0 held. p: of a primary claim by Holm for "
-    "the whole primary family, of an exploratory one as it is. Tie: all of the interval lies within 5 % "
-    "of equality, or within the spread of the reference's ensemble if that is wider. A claim holds, or does "
-    "not hold, where p is below 0.05 and the difference exceeds that spread; a cost, where its range lies on "
-    "one side. Inconclusive: anything else, fewer than four motions, a network of one seed, or a time "
-    "without a range."
+    "Effect: × the first over the second, of geometric means; of energies whose zero is a choice, points of "
+    "relative excess between the two; of frames, the first's share less half. Below: the 95 % interval over "
+    "motions and seeds (of points with the mean nearer to 0 held), of costs the range. p: of primary claims "
+    "by Holm for the whole family. Tie: all of the interval within 5 % of equality, or within the spread of "
+    "the reference's ensemble if that is wider. A claim is decided where p < 0.05 and the difference exceeds "
+    "that spread; of costs where the range lies on one side. Inconclusive: anything else, fewer than four "
+    "motions, a network of one seed."
 )
 
 
@@ -59,9 +57,8 @@ def findings(run: Run) -> list[Table]:
 
 EXCESS_NOTE = (
     "Typical: mean over motions and seeds of arcsinh(x / 1 %), taken back: a geometric mean well above 1 %, "
-    "arithmetic well below; under it the 95 % interval. Segments of a recording count as one motion. Mean: "
-    "arithmetic. Uncertain by: the spread over the reference's ensemble. Energy against the reference: more "
-    "or less where p < 0.05 and the difference exceeds that spread."
+    "arithmetic well below. Segments of a recording count as one motion. Uncertain by: the spread over the "
+    "reference's ensemble. Energy: more or less where p < 0.05 and the difference exceeds that spread."
 )
 
 

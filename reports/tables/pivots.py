@@ -127,10 +127,7 @@ def ablation_effects(run: Run) -> list[Table]:
         "geometric means. Numbers without × are variant minus base, in the unit of the column; of relative "
         "excess, in points."
     )
-    note = (
-        "Below: 95 % intervals over motions and seeds, each for itself; of points the interval on the scale "
-        "of the test, with the mean nearer to 0 held."
-    )
+    note = "Below: 95 % intervals over motions and seeds; of points with the mean nearer to 0 held."
     shown = [relative_metric(metric.name) if metric.arbitrary_zero else metric for metric in metrics]
     columns = (*HEAD, *map(metric_column, shown))
     return table("ablation_effects", columns, lines, caption, grouped_by=("garment",), note=note)

@@ -47,7 +47,6 @@ def test_every_method_of_a_claim_is_one_that_can_be_run():
     ("snug", "pbns", "verdict"),
     [
         ((0.5,), (1.0,), "inconclusive"),  # one seed of each
-        ((0.97,), (1.0,), "inconclusive"),
         ((0.5, 0.51, 0.52), (1.0, 1.01, 1.0), "holds"),
         ((1.0, 1.01, 1.0), (0.5, 0.51, 0.52), "does not hold"),
         ((0.7, 0.8, 0.9), (1.0, 1.0, 1.0), "inconclusive"),  # 0.2 apart, 0.25 of scatter
@@ -117,7 +116,7 @@ def costs(method, train, data=0.0, setup=1.0):
 
 @pytest.mark.parametrize(
     ("supervised", "verdict"),
-    [(30_000.0, "holds"), (300.0, "does not hold"), (10_100.0, "tie"), (50.0, "does not hold")],
+    [(30_000.0, "holds"), (300.0, "does not hold"), (10_100.0, "tie")],
 )
 def test_two_orders_of_magnitude_are_judged_with_their_factor(supervised, verdict):
     """SNUG: 101 s with its setup; the other: `supervised` of training and data, and a second of setup."""
