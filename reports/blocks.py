@@ -2,7 +2,7 @@
 
 The PDF and the page walk the same BLOCKS, below the sentences of page one. A block without content is left
 out, and so is a heading with nothing below it. Blocks before the first heading make page one.
-A new figure is a function in a file of its own and a line here.
+A new figure is a function of reports.figures.charts and a line here.
 """
 
 from __future__ import annotations

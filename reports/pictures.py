@@ -1,9 +1,7 @@
-"""Pictures of garments: a renderer, methods side by side at one frame, and the worst failures.
+"""Pictures of garments: methods side by side at one frame, and the worst failures.
 
-Rendering of meshes: an orthographic camera, a depth buffer, light from the side.
-
-Drawn on the processor: no OpenGL is needed, whose drivers kill the process where there is no display, and
-the same machine gives the same bytes.
+They are drawn on the processor, by a depth buffer: no OpenGL is needed, whose drivers kill the process where
+there is no display, and the same machine gives the same bytes.
 """
 
 from __future__ import annotations
