@@ -1,8 +1,7 @@
 """Named recipes, and the deviations of the default recipe from the paper's text.
 
-`default` trains well on a CPU in minutes, `paper` follows the paper's text except for what the comment below
-lists, the ablations are the default with one option changed. Each deviation can be undone or added alone;
-together they name every option in which the two recipes differ. Imports nothing heavy.
+`default` trains well on a CPU in minutes, `paper` follows the paper's text except for what docs/method.md
+lists, the ablations are the default with one option changed. Imports nothing heavy.
 """
 
 from __future__ import annotations
@@ -11,16 +10,12 @@ from dataclasses import replace
 
 from snug.recipe import DEFAULT, TERMS, Recipe, RecipeError
 
-# Not the text's, besides what it does not state (docs/method.md lists all): inputs are divided by their
-# spread (TrainingSet.input_statistics); weights are borrowed from the skin of the bones that the garment
-# covers; d(x) is taken to cached points of the skin, which walk with the cloth and of which a few are
-# searched anew in a step (the text computes it anew; searching all 48 frames would take several times
-# as long as the rest of a step); only to skin that the rule of regions allows; the garment that the offsets
-# are added to follows the shape of the body; the number of steps is fixed; and hinges are scaled, as its
-# authors have since corrected the text: every network is evaluated with scaled hinges, and trained on printed
-# ones its row would mix the recipe with another cloth (`printed-bending` below shows that alone). Its weights
-# and its Adam start as in Keras, which its authors use. Their constant of contact is of a vertex; it is taken
-# per area of the garment at the paper's number of vertices, so that a coarser mesh is not softer.
+# docs/method.md lists where it departs from the text by no option. Contact is taken to cached points of the
+# skin, for searching all 48 frames of a step would take several times as long as the rest of it. Hinges are
+# scaled, as the authors have since corrected the text: every network is evaluated with scaled hinges, and
+# trained on printed ones its row would mix the recipe with another cloth (see `printed-bending` below). Their
+# constant of contact is of a vertex; it is taken per area of the garment at the paper's number of vertices,
+# so that a coarser mesh is not softer.
 PAPER = Recipe(
     name="paper",
     pose_input="axis_angle",

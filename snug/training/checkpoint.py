@@ -22,8 +22,7 @@ CHECKPOINT_FORMAT = "snug-checkpoint-8"
 class Checkpoint:
     """File of a run's checkpoints, and how often one is written.
 
-    When a checkpoint is written changes no number, so minutes of a clock do no harm. The file stays until
-    `delete`: until the caller has written the finished model, the checkpoint is all there is.
+    The file stays until `delete`: until the caller has written the finished model, it is all there is.
 
     Attributes:
         path: the file.

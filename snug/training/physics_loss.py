@@ -23,8 +23,7 @@ The material of PBNS itself (Bertiche et al. 2021), springs, hinges, uniform mas
     contact  25 max(4 mm - n.(x - c), 0)^2  [J]  on vertices, with the contact planes of all our training
 
 `|n0 - n1|^2 = 4 sin^2(theta/2) = theta^2 - theta^4/12 + ...`: the hinge has 3 % more at 0.6 rad, and goes on
-growing where a folded edge no longer resists. Constants as in the authors' own training. No inertia: a static
-method, on the mean body.
+growing where a folded edge no longer resists. Constants as in the authors' own training.
 """
 
 from __future__ import annotations
