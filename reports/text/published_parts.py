@@ -23,7 +23,7 @@ from __future__ import annotations
 
 import math
 import re
-from argparse import SUPPRESS, ArgumentParser
+from argparse import SUPPRESS
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -75,8 +75,6 @@ def published_part(request: str) -> str:
     kind, _, name = what.partition(" ")
     if (part := request.partition(";")[0]) in PARTS:
         return markdown_table(chosen_rows(PARTS[part](), wanted))
-    if request == "evaluations of published runs":
-        return markdown_table(evaluation_rows())
     if what == "table overview" and methods:
         return markdown_table(_overview(folders, wanted, methods))
     forms: dict[str, Callable[[], str | Rows]] = {
@@ -264,14 +262,9 @@ def _made(folder: Path, name: str) -> Table:
 ALL = 10_000  # frames or more: whole motions
 
 
-def option_rows(parser: ArgumentParser) -> Rows:
-    """Return a heading and a row of each option of a command, with the text of its --help.
-
-    >>> parser = ArgumentParser()
-    >>> _ = parser.add_argument("--seed", metavar="N", default=0, help="of training (default %(default)s)")
-    >>> option_rows(parser)[1]
-    ('`--seed N`', 'of training (default 0)')
-    """
+def option_rows() -> Rows:
+    """Return a heading and a row of each option of benchmarks.run, with the text of its --help."""
+    parser = make_parser()
     texts = parser._get_formatter()
     shown = [action for action in parser._actions if action.option_strings and action.help != SUPPRESS]
     rows = [
@@ -373,7 +366,8 @@ PARTS = {
     "sizes": size_rows,
     "studies": study_rows,
     "parts": part_rows,
-    "options of benchmarks.run": lambda: option_rows(make_parser()),
+    "options of benchmarks.run": option_rows,
+    "evaluations of published runs": evaluation_rows,
     "sources of the library": lambda: list(source_rows()),
 }
 
