@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import torch
 
-from snug.training import contact_planes, optimisation_step
-from snug.training.divergence_guard import PATIENCE, SETTLING, SNAPSHOT_EVERY
+from snug.training import contact_planes, divergence_guard, optimisation_step
+from snug.training.divergence_guard import PATIENCE, SETTLING
 from snug.training.train_network import TrainingLoop
 from snug.training.training_set import TrainingError
 from tests.snug.training.dressing import PLAIN, make_trainer
@@ -36,19 +36,20 @@ def weights_of(trainer):
     return torch.cat([p.detach().flatten() for p in trainer.network.parameters()])
 
 
-def test_lost_weights_come_back():
+def test_lost_weights_come_back(monkeypatch):
     """A gradient that is not finite ruins the weights, and with them every later batch."""
+    monkeypatch.setattr(divergence_guard, "SNAPSHOT_EVERY", 20)
     trainer = make_trainer()
-    for number in range(SNAPSHOT_EVERY + 3):
+    for number in range(23):
         trainer.step(number)
     before = weights_of(trainer)
     with torch.no_grad():
         trainer.network.offsets.bias[7] = float("nan")
-    losses = [trainer.step(SNAPSHOT_EVERY + 3 + k)["loss"] for k in range(PATIENCE + 2)]
+    losses = [trainer.step(23 + k)["loss"] for k in range(PATIENCE + 2)]
     assert not np.isfinite(losses[:PATIENCE]).any() and np.isfinite(losses[PATIENCE:]).all()
     summary = trainer.guard.summary
     assert summary["restored"] == 1 and summary["skipped_updates"] == PATIENCE
-    assert summary["named_windows"][-1]["action"] == f"weights of step {SNAPSHOT_EVERY} restored, rate halved"
+    assert summary["named_windows"][-1]["action"] == "weights of step 20 restored, rate halved"
     assert "motion 'sway' frame" in summary["named_windows"][-1]["window"]
     assert trainer.guard.rate == 0.5
     assert (weights_of(trainer) - before).abs().max() < 0.02  # a few steps of 1e-3, and as many back
