@@ -40,6 +40,7 @@ class Kind:
         recipe: options of network and training, unless others are named.
         targets: what teaches it: the `energies`, simulated `vertices`, or `bands` of their unposed offsets
             (snug.training.simulated_data).
+        static: whether it knows single frames alone, so that no inertia is in its loss.
         fitted: whether it is fitted in one go, in place of training steps (snug.networks.fitted).
         closed_form: whether it trains faster by snug.kernels.gru.
         cost: time of a step, where one of SNUG's takes 1.
@@ -51,6 +52,7 @@ class Kind:
     sizes: tuple[int, ...] = ()
     recipe: Recipe = DEFAULT
     targets: str = "energies"
+    static: bool = False
     fitted: bool = False
     closed_form: bool = False
     cost: float = 1.0
@@ -75,24 +77,27 @@ class Kind:
 
 def _handles(count: int, cost: float) -> Kind:
     return Kind(name=f"handles-{count}", label=f"{count} handles", architecture="handles.StaticHandles",
-                sizes=(count,), recipe=HANDLES, cost=cost)  # fmt: skip
+                sizes=(count,), recipe=HANDLES, static=True, cost=cost)  # fmt: skip
 
 
 KINDS = {
     kind.name: kind
     for kind in (
         Kind(name="snug", label="SNUG", architecture="regressor.Regressor", closed_form=True),
-        Kind(name="pbns", label="PBNS", architecture="pbns.PoseSpaceDeformation", recipe=PBNS, cost=0.4),
+        Kind(name="pbns", label="PBNS", architecture="pbns.PoseSpaceDeformation", recipe=PBNS,
+             static=True, cost=0.4),
         Kind(name="supervised", label="Supervised", architecture="regressor.Regressor", recipe=SUPERVISED,
              targets="vertices", closed_form=True),
         Kind(name="santesteban2019", label="Santesteban 2019", architecture="santesteban2019.FitAndWrinkles",
              recipe=SANTESTEBAN2019, targets="vertices", closed_form=True),
         Kind(name="tailornet", label="TailorNet", architecture="tailornet.FrequencyMixture",
-             recipe=TAILORNET, targets="bands"),
+             recipe=TAILORNET, targets="bands", static=True),
         Kind(name="nearest-poses", label="Nearest poses", architecture="fitted.NearestPoses",
-             recipe=NEAREST_POSES, targets="vertices", fitted=True),
+             recipe=NEAREST_POSES, targets="vertices", static=True,
+             fitted=True),
         Kind(name="pose-regression", label="Ridge on principal components",
-             architecture="fitted.PoseRegression", recipe=POSE_REGRESSION, targets="vertices", fitted=True),
+             architecture="fitted.PoseRegression", recipe=POSE_REGRESSION, targets="vertices", static=True,
+             fitted=True),
         _handles(20, 0.4),
         _handles(40, 0.4),
         _handles(80, 0.5),
@@ -101,7 +106,7 @@ KINDS = {
         Kind(name="ncs", label="Neural Cloth Simulation", architecture="ncs.TwoBranches", recipe=NCS,
              cost=2.5),
         Kind(name="ncs-static", label="Neural Cloth Simulation, static branch",
-             architecture="ncs.StaticBranch", recipe=NCS, cost=2.5),
+             architecture="ncs.StaticBranch", recipe=NCS, static=True, cost=2.5),
     )
 }  # fmt: skip
 

@@ -3,6 +3,7 @@
 | module | what lies there |
 | --- | --- |
 | declared_networks, declared_solvers | declarations, and trainings of networks |
+| own_energies | energies that a method was trained on, and the simulation of these |
 | simulation, reference_variants, warm_started, sweeps | solvers of the time step |
 | networks | trained networks, collision post-processing, skinning |
 | lower_bounds | vertices of a clip optimised directly, steps within what a network can express |
@@ -20,6 +21,7 @@ from benchmarks.declarations import by_name
 from benchmarks.method import MethodEntry
 from benchmarks.methods.declared_networks import NETWORKS
 from benchmarks.methods.declared_solvers import SOLVERS
+from benchmarks.methods.own_energies import OWN_REFERENCES
 
 METHODS = (
     MethodEntry(
@@ -40,6 +42,7 @@ METHODS = (
     ),
     *NETWORKS,
     *SOLVERS,
+    *OWN_REFERENCES,
 )
 
 

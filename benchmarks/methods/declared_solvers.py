@@ -98,24 +98,6 @@ SOLVERS = (
         "refrozen", ", planes searched twice",
         ", each step solved again with contact planes searched at its end", "refrozen", refreeze=1,
     ),
-    # A variant of the physics, set beside its base: a "reference-variant" would be read as an uncertainty of
-    # the reference, and a "solver" as an approximation of it.
-    *(
-        MethodEntry(
-            name=f"simulation-{exchange}",
-            label=f"Simulation, {exchange.replace('-', ' ').replace('pbns', 'PBNS')}",
-            description=f"the reference with {change}",
-            module="benchmarks.methods.reference_variants:make_other_material",
-            options={"exchange": exchange},
-            role="ablation",
-            reporting=Reporting(base="simulation"),
-        )
-        for exchange, change in (
-            ("printed-bending", "hinges as the paper prints them, not scaled: some 3 times as stiff"),
-            ("springs", "springs on the edges in place of StVK's membrane, those of recipe springs"),
-            ("pbns-springs", "PBNS's own springs and hinges, as the paper's figure 3 has them"),
-        )
-    ),
     # Newton: every iteration is a factorisation of the true Hessian, or several. A few iterations begin with
     # all negative curvature taken out: moving cloth needs that in nearly every first one, and five Hessians
     # would be assembled to find it out.

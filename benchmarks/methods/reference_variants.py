@@ -1,56 +1,35 @@
-"""Variants of the reference: other material, perturbed start.
+"""Variants of the reference: the energies of a recipe, perturbed start.
 
-All are measured, as every method, by the energies that the scene declares; another material starts where the
-scene's own does. Wrinkling cloth has several minima, and which one is reached hangs on the last digits: what
-runs from perturbed starts differ by is the uncertainty of whatever is compared with the reference.
+All are measured, as every method, by the energies that the scene declares; with other energies they start
+where the scene's own does. Wrinkling cloth has several minima, and which one is reached hangs on the last
+digits: what runs from perturbed starts differ by is the uncertainty of whatever is compared with the
+reference.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from benchmarks.methods.simulation import Simulation
+from benchmarks.methods.simulation import STATIC, Simulation
 from benchmarks.scene import BuiltScene
-from reference_sim.energies.bend_hinge import BendHinge
-from reference_sim.energies.energy import Energy
-from reference_sim.energies.stretch_spring import StretchSpring
-from reference_sim.energies.stretch_stvk import StretchStVK
-from snug.training.physics_loss import BENDING
+from snug.recipe import DEFAULT, Recipe
+from snug.training.physics_loss import make_contact, static_terms
 
 
-def _printed_bending(term: Energy) -> Energy:
-    """Return hinges as the SNUG paper prints them, k/2 theta^2 each, not scaled; other terms as they are."""
-    if not isinstance(term, BendHinge):
-        return term
-    return BendHinge(term.cloth, scaling="none", rest_angles=term.rest_angles)
+def of_own_energies(scene: BuiltScene, recipe: Recipe) -> BuiltScene:
+    """Return the scene with the energies that a recipe trains on; the start stays that of its own ones.
 
-
-def _springs(term: Energy) -> Energy:
-    """Return k (l - l0)^2 of each edge, which recipe `springs` trains on, in place of the membrane."""
-    return StretchSpring(term.cloth) if isinstance(term, StretchStVK) else term
-
-
-def _pbns_springs(term: Energy) -> Energy:
-    """Return PBNS's springs and hinges, as recipe `pbns-springs` has them; the weight is the scene's."""
-    exchanged = _printed_bending(_springs(term))
-    if isinstance(exchanged, BendHinge):
-        exchanged.stiffness = np.full(len(exchanged.stencils), 2.0 * BENDING)
-    return exchanged
-
-
-EXCHANGES = {"printed-bending": _printed_bending, "springs": _springs, "pbns-springs": _pbns_springs}
-
-
-def of_other_energies(scene: BuiltScene, exchange: Callable[[Energy], Energy]) -> BuiltScene:
-    """Return the scene with each energy exchanged by that function; the start stays that of its own ones."""
+    Self-contact, which is no energy of a recipe, stays.
+    """
+    own = *static_terms(scene.cloth, recipe).values(), make_contact(scene.cloth, recipe)
+    further = scene.minimised[len(scene.energies) :]
     start = scene.start_state
-    energies, minimised = (tuple(map(exchange, terms)) for terms in (scene.energies, scene.minimised))
-    return replace(scene, energies=energies, minimised=minimised, settle=lambda: start)
+    return replace(scene, energies=own, minimised=own + further, settle=lambda: start)
 
 
 def of_perturbed_start(scene: BuiltScene, shift: float) -> BuiltScene:
@@ -66,9 +45,13 @@ def of_perturbed_start(scene: BuiltScene, shift: float) -> BuiltScene:
     return replace(scene, settle=lambda: start)
 
 
-def make_other_material(*, models: Path, seed: int, exchange: str) -> Simulation:
-    """Make the reference with that exchange, one of EXCHANGES."""
-    return Simulation(change=partial(of_other_energies, exchange=EXCHANGES[exchange]))
+def make_own_reference(*, models: Path, seed: int, **options: Any) -> Simulation:
+    """Make the simulation of the energies of a recipe with these options, the default's in all else."""
+    recipe = replace(DEFAULT, **options)
+    change = partial(of_own_energies, recipe=recipe)
+    if "inertia" in recipe.terms:
+        return Simulation(change=change)
+    return Simulation(STATIC, change=change)
 
 
 def make_perturbed_start(*, models: Path, seed: int, shift: float) -> Simulation:

@@ -10,6 +10,7 @@ from fnmatch import fnmatchcase
 from benchmarks.assets import Inputs
 from benchmarks.external.roll_out_files import PLACE
 from benchmarks.method import MethodEntry
+from benchmarks.methods.own_energies import own_reference
 from benchmarks.metrics import measured_in
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
@@ -61,6 +62,7 @@ def choose_cells(read: ReadStudy) -> tuple[tuple[Cell, ...], tuple[Case, ...]]:
                 key = (scene.name, entry.name, seed)
                 before = chosen[key].suites if key in chosen else ()
                 chosen[key] = Cell(scene.at(study.sizes), entry, seed, (*before, name))
+    chosen |= own_references(chosen)
     cases = tuple(_cases(study, read.cases))
     if not (chosen or cases):
         raise StudyError(
@@ -72,10 +74,24 @@ def choose_cells(read: ReadStudy) -> tuple[tuple[Cell, ...], tuple[Case, ...]]:
     places = {name: place for place, name in enumerate(read.scenes)}
     order = {name: place for place, name in enumerate((*read.methods, *study.rollouts))}
     cells = _timed_once(
-        sorted((*chosen.values(), *stored), key=lambda c: (places[c.scene.name], order[c.method], c.seed))
+        sorted(
+            (*chosen.values(), *stored), key=lambda c: (places[c.scene.name], order.get(c.method, 0), c.seed)
+        )
     )
     _check_user_scenes([cell.scene for cell in cells], read.motions)
     return tuple(cells), cases
+
+
+def own_references(chosen: Mapping[tuple[str, str, int], Cell]) -> dict[tuple[str, str, int], Cell]:
+    """Return the simulations of methods' own energies, in scenes where the reference runs and these count."""
+    compared = {c.scene.name for c in chosen.values() if c.entry.role == "reference"}
+    added = {}
+    for cell in chosen.values():
+        counts = any(m.name == "own_energies" for m in measured_in(cell.scene.metrics))
+        entry = own_reference(cell.entry) if counts and cell.scene.name in compared else None
+        if entry and (key := (cell.scene.name, entry.name, 0)) not in chosen:
+            added[key] = replace(cell, entry=entry, seed=0)
+    return added
 
 
 def matching(names: Iterable[str], patterns: Sequence[str]) -> list[str]:

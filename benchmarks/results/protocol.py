@@ -18,7 +18,7 @@ DIGESTS = {
     "scenes": "88c6128b67b3dd78",
     "materials": "37f8eb4aecad748b",
     "motions": "dc71f7b3a0e629a9",
-    "metrics": "38c79e9b47dc2ab8",
+    "metrics": "72cc8a3f3e8ba02f",
     "reference": "7c745c22c1ea3e12",
     "sampling": "01a71f93dd349175",
     "statistics": "bbdacc941ceaa26a",

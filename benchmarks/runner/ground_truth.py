@@ -18,11 +18,6 @@ if TYPE_CHECKING:
     from reference_sim import Trajectory
     from snug.motion.motion import Motion
 
-# With this time step [s] and no velocities inertia weighs a thousandth of what it weighs in a frame: a hem
-# that swings once in a second comes within 3 % of its static place, and there is still one minimum to go to.
-SLOW = 1.0
-TOLERANCE = 1e-4  # mean vertex weights: the hem is measured in millimetres
-
 
 def settle_start(scene: Scene, context: Context, needed: Needed) -> Outcome:
     """Write the garment settled in the first pose of a scene, and the posed body.
@@ -140,14 +135,15 @@ def simulate_quasi_static(scene: Scene, context: Context, needed: Needed) -> Out
     """Write the quasi-static solution of each frame of a scene: dynamics are measured against it."""
     import numpy as np
 
+    from benchmarks.methods.simulation import STATIC
     from reference_sim import simulate
 
     built = build_scene(scene, context)
     path = context.folder.quasi_static_path(scene.name)
     path.parent.mkdir(parents=True, exist_ok=True)
     trajectory = simulate(
-        built.cloth, built.simulated_energies, dt=SLOW, frames=built.frames, obstacle=built.obstacle,
-        start=built.start, quasi_static=True, tolerance=TOLERANCE, pin_positions=built.pin_positions,
+        built.cloth, built.simulated_energies, frames=built.frames, obstacle=built.obstacle,
+        start=built.start, pin_positions=built.pin_positions, **STATIC,
     )  # fmt: skip
     if trajectory.frames < built.frames or not np.isfinite(trajectory.positions).all():
         reason = f"ended after {trajectory.frames} of {built.frames} frames: {trajectory.reason}"

@@ -18,13 +18,10 @@ from functools import partial
 from pathlib import Path
 
 from benchmarks import MethodEntry
-from benchmarks.methods.reference_variants import of_other_energies
+from benchmarks.methods.reference_variants import of_own_energies
 from benchmarks.methods.simulation import Simulation
-from benchmarks.scene import BuiltScene
-from reference_sim.energies import ContactPenalty
 from snug.named_recipes import PAPER
-from snug.recipe import DEFAULT, Recipe
-from snug.training.physics_loss import make_contact
+from snug.recipe import DEFAULT
 
 KEPT = "recipe's contact"
 REPLACED = {
@@ -46,13 +43,7 @@ METHODS = tuple(
 )
 
 
-def with_contact(scene: BuiltScene, recipe: Recipe) -> BuiltScene:
-    """Return the scene with the contact of a recipe; the start stays that of the scene's own contact."""
-    contact = make_contact(scene.cloth, recipe)
-    return of_other_energies(scene, lambda term: contact if isinstance(term, ContactPenalty) else term)
-
-
 def make(*, models: Path, seed: int, replaced: tuple[str, ...]) -> Simulation:
     """Make the simulation with the recipe's contact, the fields `replaced` those of the default recipe."""
     recipe = replace(PAPER, **{option: getattr(DEFAULT, option) for option in replaced})
-    return Simulation(change=partial(with_contact, recipe=recipe))
+    return Simulation(change=partial(of_own_energies, recipe=recipe))

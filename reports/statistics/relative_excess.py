@@ -34,6 +34,7 @@ from reports.statistics.effects import (
 from reports.statistics.means_and_spreads import Mean, pair
 
 TOTAL = "energy/total"
+OWN_EXCESS = "own_excess/total"
 SKINNING = "skinning"  # the method that has 100 %
 RELATIVE_EXCESS = Metric(
     name="relative_excess/total", unit="%", title="Relative excess",
@@ -181,6 +182,15 @@ def excess_of(run: Run, rows: pd.DataFrame, method: str) -> Excess | None:
         for name in (method, SKINNING)
     )
     return Excess(effect(one, zero, EXCESS), one.cells, 100.0 * own / skinning, one.fewer)
+
+
+def own_excess_of(run: Run, rows: pd.DataFrame, method: str) -> Effect | None:
+    """Return the excess in a method's own energies (benchmarks.metrics.own_energies); None without one.
+
+    Its `shown` is the typical value [%] over the scenes of these rows.
+    """
+    one, zero = pair(rows, method, run.reference, OWN_EXCESS)
+    return effect(one, zero, EXCESS) if one and zero else None
 
 
 def compared_excess(

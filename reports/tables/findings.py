@@ -12,7 +12,13 @@ from reports.statistics.effects import recording_of
 from reports.statistics.means_and_spreads import AT_REFERENCE, in_spreads
 from reports.statistics.outcomes import check_name, checks, stress_tests, tolerances_away
 from reports.statistics.paper_claims import judged
-from reports.statistics.relative_excess import SKINNING, Excess, excess_of, with_relative_excess
+from reports.statistics.relative_excess import (
+    SKINNING,
+    Excess,
+    excess_of,
+    own_excess_of,
+    with_relative_excess,
+)
 from reports.statistics.verdicts import measure_of, standing, untested
 from reports.tables.table import GARMENT, METHOD, SCENE, SUITE, Cell, Column, Table, table
 
@@ -70,14 +76,15 @@ def relative_excess(run: Run) -> list[Table]:
         rows = with_relative_excess(run, run.garment_rows[run.garment_rows["garment"] == garment])
         for method in run.ordered(set(rows[rows["usable"]]["method"]) - zero):
             if excess := excess_of(run, rows, method):
-                lines.append((garment, method, *_cells_of(excess)))
+                own = own_excess_of(run, rows, method)
+                lines.append((garment, method, own, *_cells_of(excess)))
     columns = (
-        GARMENT, METHOD, Column("typical", "Typical", "%", digits=2),
-        Column("recorded", "Recorded", "%", digits=2), Column("others", "Others", "%", digits=2),
-        Column("pooled", "Pooled", "%", digits=2), Column("mean", "Mean", "%", digits=2),
-        Column("worst", "Worst", "%", digits=2), Column("worst_motion", "Worst motion", text=True),
-        Column("uncertain_by", "Uncertain by", "%"), Column("motions", "Motions"),
-        Column("verdict", "Energy against the reference", text=True),
+        GARMENT, METHOD, Column("own", "In own energies", "%", digits=2),
+        Column("typical", "Typical", "%", digits=2), Column("recorded", "Recorded", "%", digits=2),
+        Column("others", "Others", "%", digits=2), Column("pooled", "Pooled", "%", digits=2),
+        Column("mean", "Mean", "%", digits=2), Column("worst", "Worst", "%", digits=2),
+        Column("worst_motion", "Worst motion", text=True), Column("uncertain_by", "Uncertain by", "%"),
+        Column("motions", "Motions"), Column("verdict", "Energy against the reference", text=True),
     )  # fmt: skip
     caption = (
         "Relative excess, (E - E_reference) / (E_skinning - E_reference) of the total energy E. Typical "

@@ -23,7 +23,7 @@ from reports.statistics.pareto import (
     run_time,
     truncated,
 )
-from reports.statistics.relative_excess import excess_of, with_relative_excess
+from reports.statistics.relative_excess import excess_of, own_excess_of, with_relative_excess
 from reports.statistics.verdicts import compare_methods
 from reports.tables.table import Cell, Column, Table, in_scenes, metric_column, table
 
@@ -64,16 +64,20 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     with_excess = with_relative_excess(run, rows_of_garment)
     excess = {name: excess_of(run, with_excess, name) for name in chosen if name != run.reference}
     faster = {name: _times_faster(run, timed, name) for name in chosen}
-    shares: dict[str, tuple[Cell, Cell]] = {name: (of.effect, of.pooled) for name, of in excess.items() if of}
-    shares |= {run.reference: (0.0, 0.0)} if shares else {}
+    own = {name: own_excess_of(run, rows_of_garment, name) for name in excess}
+    shares: dict[str, tuple[Cell, Cell, Cell]] = {
+        name: (own[name], of.effect, of.pooled) for name, of in excess.items() if of
+    }
+    shares |= {run.reference: (0.0, 0.0, 0.0)} if shares else {}
     lines: list[tuple[Cell, ...]] = [
         (
-            method, *shares.get(method, (None, None)),
+            method, *shares.get(method, (None, None, None)),
             *(mean_of(rows, method, metric.name) for metric, rows in asked), faster[method],
         )
         for method in chosen
     ]  # fmt: skip
     columns = [
+        Column("own_excess", "Excess in own energies", "%", digits=2),
         Column("relative_excess", "Relative excess", "%", digits=2),
         Column("pooled", "Pooled", "%", digits=2),
         *(metric_column(metric) for metric, _ in asked), Column("faster", "Times faster"),
@@ -84,8 +88,10 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     if not columns:
         return []
     of_motions = (
-        f"{garment}: relative excess as a geometric mean over independent sources, pooled as the ratio of "
-        "sums over motions, the rest as arithmetic means over motions"
+        f"{garment}: excess as a geometric mean over independent sources, pooled as the ratio of sums over "
+        "motions, the rest as arithmetic means over motions. In own energies: over the minimum of what the "
+        "network was trained on, so how well it was trained; relative excess: by the energies that all are "
+        "compared by. A dash: trained on simulated vertices, or on energies without a minimum"
     )
     caption = of_motions if garment else f"Means {in_scenes(scenes)}"
     caption += f"; run times (and energy gaps) {in_scenes(scenes)}." if garment and scenes else "."

@@ -54,7 +54,7 @@ from reference_sim.kernels.fast_kernels import (
     has_kernel,
     warn_slow_path,
 )
-from reference_sim.material import GRAVITY, Material
+from reference_sim.material import GRAVITY
 from snug.kernels.skinning import from_lanes, to_lanes
 from snug.recipe import TERMS, Recipe, find_energy
 from snug.training.device import CPU, compiled
@@ -67,12 +67,11 @@ MARGIN = 4e-3  # [m]
 
 def spring_terms(cloth: Cloth) -> tuple[Energy, Energy, Energy]:
     """Return membrane, bending and gravity of PBNS for the rest state of `cloth`, whatever its material."""
-    hinges = Material(bending_stiffness=2 * BENDING)
-    springs = Cloth(cloth.rest_positions, cloth.faces, hinges, pins=cloth.pins, rest_uv=cloth.rest_uv)
-    gravity = Gravity(springs)
+    hinges, gravity = BendHinge(cloth, scaling="none"), Gravity(cloth)
+    hinges.stiffness = np.full(len(hinges.stencils), 2 * BENDING)
     uniform = AREAL_DENSITY * cloth.areas.sum() / cloth.vertex_count
     gravity.weights = np.full(cloth.vertex_count, uniform * GRAVITY)
-    return StretchSpring(springs), BendHinge(springs, scaling="none"), gravity
+    return StretchSpring(cloth), hinges, gravity
 
 
 class SquaredContact(ContactPenalty):

@@ -133,12 +133,12 @@ def _sampling() -> dict[str, Any]:
 
 
 def _reference() -> dict[str, Any]:
-    from benchmarks.runner import ground_truth
+    from benchmarks.methods.simulation import STATIC as AT_REST
     from snug.recipe import DEFAULT
 
     return {
         "ensemble": MEMBERS, "least": LEAST_MEMBERS, "tolerance": Newton.__init__.__kwdefaults__["tolerance"],
-        "quasi-static": (ground_truth.SLOW, ground_truth.TOLERANCE), "skinning": DEFAULT.smoothing,
+        "quasi-static": (AT_REST["dt"], AT_REST["tolerance"]), "skinning": DEFAULT.smoothing,
     }  # fmt: skip
 
 

@@ -55,8 +55,8 @@ BODY = f"tshirt/{TEST}"
 # Each solver is run in one scene at least, these in all of them.
 EVERYWHERE = ("simulation", "simulation-perturbed", "skinning", "newton")
 ON_A_BODY = (
-    "simulation-printed-bending", "untrained", "snug", "supervised", "pbns", "lbfgs", "fast-lbfgs", "vbd",
-    "xpbd", "skinning+lbfgs", "snug+newton",
+    "untrained", "snug", "supervised", "pbns", "lbfgs", "fast-lbfgs", "vbd", "xpbd", "skinning+lbfgs",
+    "snug+newton",
 )  # fmt: skip
 NAMES = [*(scene.name for scene in SCENES), BODY]
 

@@ -1,0 +1,89 @@
+"""Own energies of a method: those that its network was trained on, and the simulation that minimises them.
+
+A network is as well trained as it comes near to the minimum of its own loss. So beside the energies of the
+scene, which are the same for all methods, each is measured by its own ones, against the simulation that has
+exactly these: the recipe's material, hinges, contact constants and terms. A network of single frames, or one
+trained without inertia, has no dynamics in its loss: its minimum is the quasi-static solution of each frame.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from benchmarks.method import MethodEntry, Reporting, Training
+from benchmarks.methods.declared_networks import TRAININGS
+from snug.kinds import KINDS
+from snug.recipe import DEFAULT, Recipe
+
+OPTIONS = ("material", "bending", "terms", "contact_samples", "contact_stiffness", "contact_margin")
+MODULE = "benchmarks.methods.reference_variants:make_own_reference"
+NEEDED = {"strain", "collision"}  # without these cloth shrinks or falls for ever: there is no minimum
+TRAINED = ("network", "ablation", "baseline")  # roles; a solver that starts at a network has the scene's
+
+
+def without_inertia(recipe: Recipe) -> Recipe:
+    """Return the recipe's energies of single frames."""
+    return replace(recipe, terms=tuple(term for term in recipe.terms if term != "inertia"))
+
+
+STATIC = without_inertia(DEFAULT)
+
+
+def energies_of(training: Training) -> Recipe | None:
+    """Return the energies that a network is trained on, as a recipe that is the default in all else.
+
+    None where these have no minimum, and for a network that learns simulated vertices.
+    """
+    recipe, kind = training.recipe, KINDS[training.kind]
+    if not (kind.physics and set(recipe.terms) >= NEEDED):
+        return None
+    own = replace(DEFAULT, **{option: getattr(recipe, option) for option in OPTIONS})
+    return without_inertia(own) if kind.static else own
+
+
+def own_energies(entry: MethodEntry) -> Recipe | None:
+    """Return the energies of a method's training, see `energies_of`; without one DEFAULT, the scene's.
+
+    >>> from benchmarks.methods import find_method
+    >>> own_energies(find_method("snug-paper")).contact_margin, own_energies(find_method("supervised"))
+    (0.002, None)
+    """
+    if is_own_reference(entry):
+        return replace(DEFAULT, **entry.options)
+    training = entry.training or TRAININGS.get(entry.trained or "")
+    return energies_of(training) if training and entry.role in TRAINED else DEFAULT
+
+
+def is_own_reference(entry: MethodEntry) -> bool:
+    """Return whether a method is the simulation of the energies of some network."""
+    return entry.module == MODULE
+
+
+def own_reference(entry: MethodEntry) -> MethodEntry | None:
+    """Return the simulation of a method's own energies; None where these are the scene's, or have no minimum.
+
+    Nor is there one of the scene's energies without inertia: the quasi-static solution of the scene is that.
+    """
+    own = own_energies(entry)
+    if own in (None, DEFAULT, STATIC) or is_own_reference(entry):
+        return None
+    named = (name for name, training in TRAININGS.items() if energies_of(training) == own)
+    name = next(named, entry.trained)
+    static = "inertia" not in own.terms
+    return MethodEntry(
+        name=f"simulation-{name}",
+        label=f"Simulation, energies of {name}",
+        description=f"the {'quasi-static solution' if static else 'reference'} with the energies of {name}",
+        module=MODULE,
+        options={option: getattr(own, option) for option in OPTIONS},
+        needs_body=True,
+        timed=False,
+        role="ablation",
+        reporting=Reporting(base="simulation"),
+    )
+
+
+OWN_REFERENCES = tuple(
+    {entry.name: entry for name in TRAININGS if (entry := own_reference(MethodEntry(
+        name=name, description="", trained=name, role="network")))}.values()
+)  # fmt: skip

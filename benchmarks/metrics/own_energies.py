@@ -1,0 +1,93 @@
+"""Metric own_excess/total: how far a method is from the minimum of the energies that it was trained on.
+
+    100 (E(x) - E(y)) / (E(s) - E(y)) [%],    E the mean over the judged frames
+
+with x the method's roll-out, s the skinned garment, y the simulation that minimises E. Where E is the energy
+of the scene, by which all methods are compared, y is the reference and the number the relative excess. For a
+network that was trained on others (benchmarks.methods.own_energies) y is the simulation of these, started
+where the reference starts. The two answer two questions: how well a network was trained, and what its
+garment is worth beside others. Without inertia E is that of single frames, y the quasi-static solution.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from benchmarks.methods.own_energies import (
+    STATIC,
+    is_own_reference,
+    own_energies,
+    own_reference,
+)
+from benchmarks.metric import Measurements, metrics_of
+from benchmarks.metrics.energy import energies, energy_series
+from benchmarks.results.row import USABLE
+from snug.recipe import DEFAULT
+
+if TYPE_CHECKING:
+    from benchmarks.metric import Floats, Positions, RollOut, SceneRollOuts
+    from benchmarks.scene import BuiltScene
+    from snug.recipe import Recipe
+
+NAME = "own_excess/total"
+
+
+def measure(roll_out: RollOut) -> dict[str, float]:
+    """Return the excess where the energies are not the scene's; 0 of what is a minimiser of its own ones."""
+    group, own = roll_out.group, own_energies(roll_out.entry)
+    bare = group.scene.skinned
+    if bare is not None and (roll_out is group.reference or is_own_reference(roll_out.entry)):
+        return {NAME: 0.0}
+    least = None if own in (None, DEFAULT) else _least(roll_out, own)
+    if bare is None or own is None or least is None:
+        return {}
+    terms = energy_series(_scene_of(group.scene, own), [roll_out.positions, least, bare])
+    series = [of["total"] if "inertia" in own.terms else of["total"] - of["inertia"] for of in terms]
+    return {NAME: _share(series, roll_out.judged_beside(least))}
+
+
+def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
+    """Return the excess over a reference of the scene's energies."""
+    bare = roll_out.group.kept(_of_skinning)
+    if bare is None or own_energies(roll_out.entry) != DEFAULT:
+        return {}
+    series = [energies(roll_out)["total"], energies(reference)["total"], bare]
+    return {NAME: _share(series, roll_out.judged_beside(reference.positions))}
+
+
+def _scene_of(scene: BuiltScene, recipe: Recipe) -> BuiltScene:
+    from benchmarks.methods.reference_variants import of_own_energies  # loads torch
+
+    return of_own_energies(scene, recipe)
+
+
+def _least(roll_out: RollOut, own: Recipe) -> Positions | None:
+    """Return the minimiser (T,V,3) [m] of these energies; None where no simulation of them has ended well."""
+    if own == STATIC:
+        return roll_out.group.quasi_static
+    entry = own_reference(roll_out.entry)
+    found = (other for other in roll_out.group.roll_outs if entry and other.entry.name == entry.name)
+    return next((other.positions for other in found if other.status in USABLE), None)
+
+
+def _of_skinning(group: SceneRollOuts) -> Floats | None:
+    bare = group.scene.skinned
+    return None if bare is None else energy_series(group.scene, [bare])[0]["total"]
+
+
+def _share(series: Sequence[Floats], judged: slice) -> float:
+    """Return the excess [%] of a method, from its energies (T,), those of the minimiser and of skinning."""
+    method, minimum, bare = (float(energy[judged].mean()) for energy in series)
+    return 100.0 * (method - minimum) / (bare - minimum) if bare > minimum else float("nan")
+
+
+OWN_ENERGIES = Measurements(
+    "own_energies",
+    metrics_of((
+        NAME, "%", "Excess in own energies",
+        "excess of the energy that a method was trained on over that of the simulation with this energy, as "
+        "a share of skinning's; of a method without training in the scene's energies",
+    ), lower_is_better=True),
+    measure=measure, compare=compare,
+)  # fmt: skip

@@ -1,0 +1,115 @@
+"""Own energies: the minimiser of a network's loss has no excess in them, whatever it has by the scene's."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from benchmarks.assets import embedded_motions, open_assets
+from benchmarks.method import Training
+from benchmarks.methods import find_method
+from benchmarks.methods.own_energies import (
+    DEFAULT,
+    OWN_REFERENCES,
+    STATIC,
+    own_energies,
+    own_reference,
+)
+from benchmarks.methods.simulation import STATIC as AT_REST
+from benchmarks.methods.simulation import Simulation
+from benchmarks.metrics.own_energies import NAME, compare, measure
+from benchmarks.presets import find_preset
+from snug.kinds import KINDS
+from snug.named_recipes import PAPER
+from tests.benchmarks.plan.planned import planned
+from tests.benchmarks.runner.tasks_by_hand import dressed_scene, grouped
+
+MOTION = "arm_raise"
+
+
+@pytest.fixture(scope="module")
+def scene():
+    sizes = dataclasses.replace(find_preset("smoke"), frames=8, settle_frames=8, garment_vertices=300)
+    assets = open_assets(sizes, embedded_motions([MOTION]), ["tshirt"])
+    built = dressed_scene(MOTION, preset=sizes).build(assets)
+    start = built.start_state
+    return dataclasses.replace(built, settle=lambda: start)
+
+
+@pytest.fixture(scope="module")
+def simulations(scene):
+    """Name -> positions of the reference, "at rest" its quasi-static twin, and of own references."""
+    methods = {name: find_method(name) for name in ("simulation", *(e.name for e in OWN_REFERENCES))}
+    made = {name: entry.make(models=None, seed=0) for name, entry in methods.items()}
+    found = {}
+    for name, method in (made | {"at rest": Simulation(AT_REST)}).items():
+        method.prepare(scene)
+        found[name] = method.run().positions
+    return found
+
+
+def excess(scene, simulations, name, positions):
+    """Return a method's excess [%] in its own energies, and that of the same roll-out in the scene's."""
+    at_rest = simulations["at rest"]
+    known = {other: x for other, x in simulations.items() if other != "at rest"}
+    group = grouped(scene, known | {name: positions, "skinning": positions})
+    group.quasi_static = at_rest
+    own, plain = group.roll_outs[-2:]
+    values = measure(own) or compare(own, group.reference)
+    return values[NAME], compare(plain, group.reference)[NAME]
+
+
+@pytest.mark.parametrize(
+    "name", ["snug", "snug-paper", "pbns", "pbns-paper", "pbns-springs", "snug-springs", "snug-no-inertia"]
+)
+def test_the_minimiser_of_its_own_energies_leaves_a_network_no_excess(scene, simulations, name):
+    entry = find_method(name)
+    reference = own_reference(entry)
+    usual = "at rest" if own_energies(entry) == STATIC else "simulation"
+    best = simulations[reference.name if reference else usual]
+    own, common = excess(scene, simulations, name, best)
+    assert own == pytest.approx(0.0, abs=1e-9)
+    if name in ("snug-paper", "pbns-springs"):  # another contact, other springs: no fault of a training
+        assert common > 5.0
+    shaken = best + 1e-3 * np.random.default_rng(0).standard_normal(best.shape)
+    assert excess(scene, simulations, name, shaken)[0] > 1.0
+
+
+@pytest.mark.parametrize("name", ["supervised", "snug-no-strain", "snug-no-collision"])
+def test_what_has_no_minimum_or_learned_vertices_has_no_own_excess(scene, simulations, name):
+    assert own_energies(find_method(name)) is None and own_reference(find_method(name)) is None
+    group = grouped(scene, {"simulation": simulations["simulation"], name: simulations["simulation"]})
+    assert measure(group.roll_outs[1]) == compare(group.roll_outs[1], group.reference) == {}
+
+
+def test_solvers_and_networks_of_the_scenes_energies_need_no_further_simulation():
+    for name in ("newton-1", "snug+newton-1", "snug", "untrained", "skinning", "handles-40", "ncs"):
+        assert own_reference(find_method(name)) is None, name
+
+
+def test_a_kind_is_static_where_its_network_carries_no_state():
+    assert {k.name for k in KINDS.values() if k.static} == {
+        k.name for k in KINDS.values() if not k.network.sequential
+    }
+
+
+def test_the_simulation_joins_where_the_network_meets_the_reference():
+    def methods(*names):
+        cells = planned("smoke", "--scenes", "tshirt/01_01_a", "--methods", ",".join(names)).cells
+        return [cell.method for cell in cells]
+
+    assert methods("simulation", "snug-paper") == ["simulation", "snug-paper", "simulation-snug-paper"]
+    assert methods("snug-paper") == ["snug-paper"]
+    assert methods("simulation", "snug") == ["simulation", "snug"]
+
+
+def test_a_users_training_has_a_simulation_of_its_own_energies():
+    soft = dataclasses.replace(PAPER, contact_margin=0.001)
+    entry = dataclasses.replace(
+        find_method("snug"), name="soft", trained="soft", training=Training("snug", soft)
+    )
+    reference = own_reference(entry)
+    assert reference.name == "simulation-soft" and reference.options["contact_margin"] == 0.001
+    assert own_energies(reference) == own_energies(entry) != DEFAULT
