@@ -20,18 +20,7 @@ from reference_sim.kernels.kernel_cache import njit
 def analyse(indptr: np.ndarray, indices: np.ndarray, order: np.ndarray) -> CholmodSolver | SuperLUSolver:
     """Analyse a lower-triangular CSC pattern, with the best package that is installed.
 
-    Args:
-        indptr: (n + 1,) starts of the columns.
-        indices: (nnz,) rows; entries above the diagonal may be stored and are ignored.
-        order: (n,) fill-reducing order of rows and columns.
-
-    >>> import scipy.sparse as sp
-    >>> matrix = sp.csc_matrix([[4.0, 0.0], [1.0, 3.0]])  # its lower triangle
-    >>> solver = analyse(matrix.indptr, matrix.indices, np.arange(2))
-    >>> solver.factorise(matrix.data)
-    True
-    >>> solver.solve(np.array([5.0, 4.0]))
-    array([1., 1.])
+    Entries above the diagonal are ignored. order (n,): fill-reducing, of rows and columns.
     """
     try:
         return CholmodSolver(indptr, indices, order)

@@ -22,12 +22,7 @@ class WrongWord(ValueError):
 
 
 class Parser(argparse.ArgumentParser):
-    """Argument parser that answers a wrong or empty word with one line; examples stay as they are written.
-
-    Example:
-        >>> Parser(prog="tools.halve").prog
-        'tools.halve'
-    """
+    """Argument parser that answers a wrong or empty word with one line, and leaves examples as they are."""
 
     def __init__(self, **options: Any) -> None:
         plain = argparse.RawDescriptionHelpFormatter
@@ -56,13 +51,6 @@ def command(
         goes_on: how work that was stopped is taken up again; without it nothing is left of such work.
         bad_input: exceptions whose message says where the input is wrong; OSError does so besides. Others
             are faults of the program, and raised.
-
-    Example:
-        >>> @command("tools.halve", bad_input=(ZeroDivisionError,))
-        ... def main(number: int) -> int:
-        ...     return 0 if 1 / number else 1
-        >>> main(2)
-        0
     """
     refused: tuple[type[Exception], ...] = (*bad_input, WrongWord, OSError)
 

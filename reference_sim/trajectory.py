@@ -79,11 +79,7 @@ class Trajectory:
         return float(self.times[1] - self.times[0]) if self.frames > 1 else float("nan")
 
     def save(self, path: str | Path) -> None:
-        """Write the file, whole or not at all; what was there before stays until then.
-
-        Raises:
-            OSError: no room, or no such folder.
-        """
+        """Write the file, whole or not at all; what was there before stays until then."""
         import h5py
 
         # In memory first: HDF5 crashes where it finds no room on the disk.
@@ -97,11 +93,7 @@ class Trajectory:
 
     @classmethod
     def load(cls, path: str | Path) -> Trajectory:
-        """Read a file of this project.
-
-        Raises:
-            TrajectoryError: missing file, or not a trajectory.
-        """
+        """Read a file of this project. Raises TrajectoryError: it is missing, or no trajectory."""
         try:
             return _read(Path(path))
         except FileNotFoundError:
@@ -194,7 +186,6 @@ def _write_vtk(file: h5py.File, trajectory: Trajectory) -> None:
 SIGNATURE = b"POINTCACHE2\0"
 # Signature, version, number of points, first frame, frames a sample, number of samples.
 HEADER = np.dtype("S12, <i4, <i4, <f4, <f4, <i4")
-HEADER_SIZE = HEADER.itemsize
 TYPES = {".pc2": "<f4", ".pc16": "<f2"}
 
 
@@ -202,13 +193,6 @@ def write_point_cache(path: str | Path, trajectory: Trajectory) -> tuple[Path, P
     """Write PC2 [m, y up, float32] at `path` and the first frame as OBJ beside it; return both paths.
 
     Each file is written whole or not at all.
-
-    >>> import tempfile
-    >>> faces, times = np.array([[0, 1, 2]]), np.array([0.0, 1 / 30])
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     cache, mesh = write_point_cache(f"{folder}/a.pc2", Trajectory(np.zeros((2, 3, 3)), faces, times))
-    ...     read_point_cache(cache).shape
-    (2, 3, 3)
     """
     path = Path(path)
     mesh = path.with_suffix(".obj")
@@ -239,11 +223,7 @@ def write_obj(path: Path, positions: np.ndarray, faces: np.ndarray, uv: np.ndarr
 def read_point_cache(path: str | Path) -> np.ndarray:
     """Read positions (T, V, 3) of a .pc2 (float32) or .pc16 (float16) file, in its unit and axes.
 
-    Raises:
-        TrajectoryError: no such file, no point cache, or not as long as its header says.
-
-    >>> read_point_cache("cloth.pc2").shape  # of a file with 50 frames of 1002 vertices  # doctest: +SKIP
-    (50, 1002, 3)
+    Raises TrajectoryError: no such file, no point cache, or not as long as its header says.
     """
     path = Path(path)
     if not path.is_file():
@@ -251,13 +231,13 @@ def read_point_cache(path: str | Path) -> np.ndarray:
     if path.suffix.lower() not in TYPES:
         raise TrajectoryError(f"{path}: a point cache is named {' or '.join(TYPES)}")
     kind, length = np.dtype(TYPES[path.suffix.lower()]), path.stat().st_size
-    if length < HEADER_SIZE:
+    if length < HEADER.itemsize:
         raise TrajectoryError(f"{path}: is shorter than the header of a point cache")
     signature, version, points, _, _, frames = np.fromfile(path, HEADER, 1)[0].tolist()
-    declared = HEADER_SIZE + frames * points * 3 * kind.itemsize
+    declared = HEADER.itemsize + frames * points * 3 * kind.itemsize
     if (signature, version) != (SIGNATURE[:-1], 1) or min(points, frames) < 1 or declared != length:
         raise TrajectoryError(
             f"{path}: {signature!r} of version {version}, {frames} samples of {points} points take "
             f"{declared} bytes, the file has {length}: write it again"
         )
-    return np.fromfile(path, kind, offset=HEADER_SIZE).reshape(frames, points, 3)
+    return np.fromfile(path, kind, offset=HEADER.itemsize).reshape(frames, points, 3)

@@ -24,14 +24,7 @@ class ArrayFileError(ValueError):
 def read_arrays(path: str | Path, names: Collection[str] | None = None) -> dict[str, np.ndarray]:
     """Read those of the named arrays that an .npz file holds, by default all; others are not touched.
 
-    Raises:
-        ArrayFileError: no such file, no archive, damaged, or an array that is not plain.
-
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     np.savez(f"{folder}/x.npz", x=np.arange(3.0), y=np.zeros(2))
-    ...     read_arrays(f"{folder}/x.npz", ["x"])
-    {'x': array([0., 1., 2.])}
+    Raises ArrayFileError: no such file, no archive, damaged, or an array that is not plain.
     """
     path, name = Path(path), ""
     arrays = {}
@@ -46,17 +39,7 @@ def read_arrays(path: str | Path, names: Collection[str] | None = None) -> dict[
 
 
 def write_array(path: str | Path, array: np.ndarray) -> None:
-    """Write an .npy file.
-
-    Raises:
-        OSError: with its errno, which numpy.save hides where the disk is full.
-
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_array(f"{folder}/x.npy", np.zeros(2))
-    ...     np.load(f"{folder}/x.npy")
-    array([0., 0.])
-    """
+    """Write an .npy file. Raises OSError with the errno that numpy.save hides where the disk is full."""
     array = np.asarray(array, order="C")  # ascontiguousarray would make a number an array of one
     with open(path, "wb") as stream:
         np.lib.format.write_array_header_1_0(stream, np.lib.format.header_data_from_array_1_0(array))
@@ -129,16 +112,13 @@ class _Unpickler(pickle.Unpickler):
 def read_pickled_arrays(path: str | Path, names: Collection[str]) -> dict[str, np.ndarray]:
     """Read those of the named arrays, numbers and lists that a pickled dict holds; nothing in it is run.
 
-    Text of Python 2 is taken as latin-1.
-
-    Raises:
-        ArrayFileError: no such file, no pickle of a dict, or more in it than plain values.
+    Raises ArrayFileError: no such file, no pickle of a dict, or more in it than plain values.
     """
     path, name = Path(path), ""
     arrays = {}
     try:
         with path.open("rb") as stream:
-            held = _Unpickler(stream, encoding="latin1").load()
+            held = _Unpickler(stream, encoding="latin1").load()  # of text of Python 2
         if type(held) is not dict:
             raise ValueError("holds no dict of arrays")
         for name in names:

@@ -17,10 +17,7 @@ NO_ROOM_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 def replacing(path: Path) -> Iterator[Path]:
     """Give a temporary name beside `path`: renamed to it when the block ends well, removed when it does not.
 
-    The file that was there before stays until the new one is on the disk.
-
-    Raises:
-        OSError: names `path` where there is no room for it.
+    The file that was there before stays until the new one is on the disk. OSError names `path`, too.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     # A name that nobody can foresee: a link that lay there would be followed.
@@ -55,8 +52,7 @@ def demand_writable_folder(folder: Path) -> None:
 def new_folder(folder: Path) -> Iterator[Path]:
     """Give a folder to fill: under its name once the block ends well, gone when it does not.
 
-    Raises:
-        ValueError: something exists under that name, or no folder can be made there.
+    Raises ValueError where something exists under that name, or no folder can be made.
     """
     demand_new(folder)
     whole = folder.resolve()

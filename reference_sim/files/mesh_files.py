@@ -53,16 +53,8 @@ class Surface:
 def read_mesh(path: str | Path) -> Surface:
     """Read the triangles and quads of one mesh file.
 
-    Raises:
-        MeshError: missing or unreadable file, unknown format, no faces, faces with five corners or more,
-            a vertex that is not finite; the message names the file.
-
-    >>> import tempfile
-    >>> from reference_sim.trajectory import write_obj
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     write_obj(Path(folder, "a.obj"), np.eye(3), np.array([[0, 1, 2]]))
-    ...     read_mesh(f"{folder}/a.obj").faces
-    array([[0, 1, 2]])
+    Raises MeshError that names the file: missing, unreadable or of unknown format, without faces, with five
+    corners at a face, or a vertex that is not finite.
     """
     path = Path(path)
     if not path.is_file():
@@ -166,21 +158,10 @@ def _triangles(path: Path, polygons: Sequence[Any], known: range, what: str) -> 
 def read_sequence(pattern: str | Path) -> tuple[np.ndarray, Surface]:
     """Read a moving mesh: positions (T, B, 3) and, for its faces, the first mesh.
 
-    Args:
-        pattern: one mesh (T = 1), a folder of meshes of one kind, or a glob such as "body_*.obj". Files are
-            taken in the order of the numbers in their names.
+    pattern: one mesh (T = 1), a folder of meshes of one kind, or a glob such as "body_*.obj", taken in the
+    order of the numbers in their names.
 
-    Raises:
-        MeshError: as `read_mesh`; no files; vertices or faces that do not correspond to the first file's.
-
-    >>> import tempfile
-    >>> from reference_sim.trajectory import write_obj
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     for frame in range(2):
-    ...         write_obj(Path(folder, f"{frame}.obj"), np.eye(3) + frame, np.array([[0, 1, 2]]))
-    ...     positions, first = read_sequence(f"{folder}/*.obj")
-    >>> positions.shape
-    (2, 3, 3)
+    Raises MeshError as `read_mesh`, for no files, and for vertices or faces other than those of the first.
     """
     paths = _paths(str(pattern))
     first = read_mesh(paths[0])
@@ -241,9 +222,7 @@ STRETCHED_SHARE = 0.1  # of the area, from which a chart is no pattern
 def join_seams(surface: Surface) -> tuple[Surface, np.ndarray]:
     """Join the doubled vertices of a surface in metres: those closer than a micrometre are one.
 
-    Returns:
-        The surface, and of each vertex left its number in the file (V,). A surface without doubled vertices
-        stays as it is.
+    The number in the file of each vertex left (V,) comes second.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -266,11 +245,8 @@ def join_seams(surface: Surface) -> tuple[Surface, np.ndarray]:
 def rest_chart(surface: Surface, scale: float) -> np.ndarray:
     """Return the chart (F, 3, 2) [m] of a surface in metres, as `Cloth` takes it for `rest_uv`.
 
-    scale: metres per unit of the chart.
-
-    Raises:
-        MeshError: no chart, a corner or an area missing, a total area further than `AREA_FACTOR` from that of
-            the mesh, or pieces so distorted that they are no pattern.
+    scale: metres per unit of the chart. Raises MeshError for a chart that is missing, has no corner or area
+    somewhere, an area further than `AREA_FACTOR` from that of the mesh, or the distortion of no pattern.
     """
     instead = "rest=mesh takes the mesh itself as rest shape"
     if surface.uv is None:

@@ -247,13 +247,10 @@ def _closest(a0, a1, a2, b0, b1, b2, c0, c1, c2, x, y, z):
 
 @njit(cache=True, error_model="numpy")
 def closest_on_triangle(corners, place, x, y, z):
-    """Find the closest point of triangle corners[place] to a point (x, y, z).
+    """Return the last two weights of the point of corners[place] closest to (x, y, z), and distance^2.
 
     It is the foot of the perpendicular, where that lies inside; else the best of the sides that the foot is
     beyond, one of which holds the closest point. Of a sliver, whose foot is too inexact to tell, all sides.
-
-    Returns:
-        Weights v, w of the second and third corner at the closest point, and the squared distance to it.
     """
     # As numbers: a function with several ends counts the references to an array at every call.
     return _closest(

@@ -165,21 +165,12 @@ def carry(points, closest, closest_faces, barycentric, before, after, faces, car
 
 
 def winding_numbers(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray) -> np.ndarray:
-    """Return how often (P,) a closed mesh winds around each point.
+    """Return how often a closed mesh of vertices (B, 3) winds around points (P, 3) [m]: (P,).
 
-    Rays run along the shortest side of the mesh's bounding box, so that each meets few faces; a grid over the
-    other two axes has the faces that a ray may meet. A ray through a side or a corner is moved by less than
-    any number, the same way for all faces, so that it passes each of them once.
-
-    Args:
-        vertices: (B, 3) [m].
-        faces: (F, 3) outward wound; each side belongs to two faces, which pass it in opposite directions.
-        points: (P, 3) [m]. One on the surface counts as one beside it.
-
-    >>> corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
-    >>> faces = np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]])
-    >>> winding_numbers(corners, faces, np.array([[0.1, 0.1, 0.1], [0.5, 0.5, 0.5]])).tolist()
-    [1, 0]
+    Faces are wound outwards; a point on the surface counts as one beside it. Rays run along the shortest
+    side of the mesh's bounding box, so that each meets few faces; a grid over the other two axes has the
+    faces that a ray may meet. A ray through a side or a corner is moved by less than any number, the same
+    way for all faces, so that it passes each of them once.
     """
     numbers = np.zeros(len(points), np.int64)
     low, high = vertices.min(axis=0), vertices.max(axis=0)

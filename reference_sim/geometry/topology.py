@@ -25,13 +25,9 @@ def edge_uses(faces: Index) -> tuple[Index, Index]:
 
 
 def boundary_loops(faces: Index) -> list[Index]:
-    """Return the vertices of the boundary loops of a manifold mesh (F,3), along its winding, longest first.
+    """Return the vertices of the boundary loops of a mesh (F,3), along its winding, longest first.
 
-    Raises:
-        ValueError: the mesh is not manifold at its boundary.
-
-    >>> boundary_loops(np.array([[0, 1, 2], [0, 2, 3]]))
-    [array([0, 1, 2, 3])]
+    Raises ValueError where the mesh is not manifold at its boundary.
     """
     halves = half_edges(faces)
     size = int(faces.max()) + 1
@@ -53,12 +49,7 @@ def boundary_loops(faces: Index) -> list[Index]:
 
 
 def triangle_areas(points: Array, faces: Index) -> Array:
-    """Return the areas (F,) [m^2] of the faces (F,3) between points (V,3) [m].
-
-    >>> points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    >>> triangle_areas(points, np.array([[0, 1, 2]]))
-    array([0.5])
-    """
+    """Return the areas (F,) [m^2] of the faces (F,3) between points (V,3) [m]."""
     return corner_areas(points[faces])
 
 
@@ -71,12 +62,7 @@ def corner_areas(corners: Array) -> Array:
 
 
 def corner_angles(points: Array, faces: Index) -> Array:
-    """Return the angles (F,3) [rad] at the corners of the faces (F,3) between points (V,3) [m].
-
-    >>> points = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]])
-    >>> np.degrees(corner_angles(points, np.array([[0, 1, 2]]))).round(6)
-    array([[90., 45., 45.]])
-    """
+    """Return the angles (F,3) [rad] at the corners of the faces (F,3) between points (V,3) [m]."""
     after, before = (points[np.roll(faces, -k, axis=1)] - points[faces] for k in (1, 2))
     return np.arctan2(np.linalg.norm(np.cross(after, before), axis=2), np.sum(after * before, axis=2))
 
@@ -87,12 +73,8 @@ LEAST_AREA_RATIO = 1e-12  # area of a face relative to the mean, below which it 
 def check_closed(positions: np.ndarray, faces: np.ndarray) -> None:
     """Refuse positions (T, B, 3) [m] and faces (F, 3) that are no moving closed surface.
 
-    Raises:
-        MeshError: wrong shapes, no frame, NaN, a face without area, an open, non-manifold, inconsistently
-            wound or inside-out mesh; the message names vertex, face or edge, and the remedy.
-
-    >>> corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
-    >>> check_closed(corners[None], np.array([[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]))
+    Raises MeshError that names vertex, face or edge, and the remedy: wrong shapes, no frame, NaN, a face
+    without area, an open, non-manifold, inconsistently wound or inside-out mesh.
     """
     moving = positions.ndim == 3 and positions.shape[2] == 3 and positions.size
     if not (moving and faces.ndim == 2 and faces.shape[1] == 3 and faces.size):

@@ -43,13 +43,7 @@ class Placement:
 
 
 def orthonormal(columns: np.ndarray) -> np.ndarray:
-    """Return an orthonormal basis (n, K') of the span of columns (n, K).
-
-    Directions below 1e-9 of the largest are left out.
-
-    >>> orthonormal(np.array([[3.0, 6.0, 0.0], [0.0, 0.0, 0.0]])).shape
-    (2, 1)
-    """
+    """Return an orthonormal basis (n, K') of the span of columns (n, K)."""
     left, sizes, _ = np.linalg.svd(columns, full_matrices=False)
     return np.ascontiguousarray(left[:, sizes > SINGULAR * sizes[:1]])
 
