@@ -24,7 +24,8 @@ from snug.training import checkpoint as checkpoints
 from snug.training.checkpoint import Checkpoint
 from tests.benchmarks.runner.tasks_by_hand import InProcess
 from tests.reference_sim.test_trajectory import wave
-from tests.snug.training.test_checkpoint import same_model, short
+from tests.snug.training.dressing import short
+from tests.snug.training.test_checkpoint import same_model
 
 
 @contextmanager

@@ -18,10 +18,10 @@ from snug.motion.library import make_motion
 from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
-from snug.recipe import DEFAULT
-from snug.training.train_network import train_network, untrained_model
+from snug.training.train_network import untrained_model
 from tests.benchmarks.runner.tasks_by_hand import context, dressed_scene
 from tests.reference_sim.meshes import girth
+from tests.snug.training.dressing import short
 
 TINY = dataclasses.replace(find_preset("smoke"), garment_vertices=300, frames=10, clip_frames=8)
 
@@ -103,8 +103,7 @@ def test_no_network_moves_the_waistband(scene, kind, tmp_path):
     dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
     motion, pins = scene.dressed.motion, scene.cloth.pins
     assert dressed.skinned(motion, smoothing=20)[:, pins] == pytest.approx(handles(scene), abs=1e-5)
-    recipe = dataclasses.replace(DEFAULT, mixed=0.0)
-    trained = train_network(kind, dressed, [motion], steps=5, seed=0, recipe=recipe, progress=False)
+    trained = short(kind, dressed=dressed, motions=[motion], steps=5)
     untrained = untrained_model(kind, dressed, [motion], seed=0)
     read = TrainedModel.load(untrained.save(tmp_path / "m.safetensors"))  # weights at the waistband: not zero
     free = np.setdiff1d(np.arange(dressed.vertices), pins)

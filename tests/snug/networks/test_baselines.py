@@ -16,33 +16,16 @@ from snug.networks.tailornet import DROPOUT, FrequencyMixture
 from snug.recipe import DEFAULT
 from snug.training.physics_loss import SquaredContact, spring_terms
 from snug.training.simulated_data import smooth_offsets
-from snug.training.train_network import train_network
-from tests.snug.training.dressing import swaying, tube_dress
-
-
-def puffed(motion):
-    """A stand-in for a simulation: skinning of a wavy shirt, a little wider and lower."""
-    dressed = tube_dress()
-    rest = dressed.rest()
-    offsets = 0.05 * rest + torch.tensor([0.0, -0.01, 0.0]) + 0.002 * torch.sin(300 * rest[:, :1])
-    return dressed.skinned(motion, smoothing=20, offsets=offsets)
-
-
-def taught(kind, steps, **changes):
-    motion = swaying(24)
-    recipe = replace(KINDS[kind].recipe, **changes)
-    model = train_network(
-        kind, tube_dress(), [motion], steps=steps, seed=0, trajectories={motion.name: puffed(motion)},
-        recipe=recipe, progress=False, every=10,
-    )  # fmt: skip
-    return model, motion
+from tests.snug.training.dressing import short, stand_in, swaying, tube_dress
 
 
 @pytest.mark.parametrize("kind", ["santesteban2019", "tailornet"])
 def test_a_taught_baseline_learns_its_targets(kind, narrow):
-    model, motion = taught(kind, 30, learning_rate=4e-3, window=4 if kind != "tailornet" else 1)
+    window, motion = 4 if kind != "tailornet" else 1, swaying(24)
+    recipe = replace(KINDS[kind].recipe, learning_rate=4e-3, window=window)
+    model = short(kind, motions=[motion], steps=30, recipe=recipe, every=10)
     assert model.history[-1]["loss"] < 0.5 * model.history[0]["loss"]
-    target, positions = puffed(motion), roll_out(model, tube_dress(), motion).positions
+    target, positions = stand_in(motion), roll_out(model, tube_dress(), motion).positions
     skinned = tube_dress().skinned(motion, smoothing=20)
     error, start = (np.linalg.norm(x - target, axis=2).mean() for x in (positions, skinned))
     assert error < 0.5 * start

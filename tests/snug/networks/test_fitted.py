@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 import torch
@@ -13,8 +11,7 @@ from snug.kinds import KINDS
 from snug.networks.fitted import COMPONENTS, NEIGHBOURS, NearestPoses, PoseRegression
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
-from snug.training.train_network import train_network
-from tests.snug.training.dressing import swaying, tube_dress
+from tests.snug.training.dressing import short, stand_in, swaying, tube_dress
 
 FITTED = ("nearest-poses", "pose-regression")
 
@@ -23,22 +20,6 @@ def frames(count: int, inputs: int = 6, vertices: int = 5) -> tuple[torch.Tensor
     generator = torch.Generator().manual_seed(count)
     poses = 0.3 + torch.randn(count, inputs, generator=generator)
     return poses, 0.1 * torch.randn(count, vertices, 3, generator=generator)
-
-
-def swelling(motion):
-    """A stand-in for a simulation: skinning of a shirt that is the wider the further the trunk is bent."""
-    bend = torch.as_tensor(motion.poses[:, 3, 2]).float()
-    offsets = (0.1 * bend[:, None, None]) * tube_dress().rest()
-    return tube_dress().skinned(motion, smoothing=20, offsets=offsets)
-
-
-def fitted(kind: str, count: int = 40, **changes) -> tuple[TrainedModel, np.ndarray]:
-    motion = swaying(count)
-    recipe, target = replace(KINDS[kind].recipe, **changes), swelling(motion)
-    model = train_network(
-        kind, tube_dress(), [motion], steps=1, seed=0, recipe=recipe, trajectories={motion.name: target}
-    )
-    return model, target
 
 
 def test_a_training_pose_has_its_own_offsets_and_a_pose_between_two_is_shared():
@@ -88,19 +69,17 @@ def test_damped_offsets_are_those_of_skin_but_where_a_blend_is_nearly_singular()
 
 @pytest.mark.parametrize("kind", FITTED)
 def test_a_fitted_model_follows_its_training_motion_and_loads_as_it_was(kind, tmp_path):
-    model, target = fitted(kind)
-    positions = roll_out(model, tube_dress(), swaying(40)).positions
-    start = tube_dress().skinned(swaying(40), smoothing=20)
-    assert (
-        np.abs(positions - target).max()
-        < (0.02 if kind == "nearest-poses" else 0.5) * np.abs(start - target).max()
-    )
+    motion = swaying(40)
+    model, target = short(kind, motions=[motion], recipe=KINDS[kind].recipe), stand_in(motion)
+    positions = roll_out(model, tube_dress(), motion).positions
+    start, share = tube_dress().skinned(motion, smoothing=20), 0.02 if kind == "nearest-poses" else 0.5
+    assert np.abs(positions - target).max() < share * np.abs(start - target).max()
     # The loss is the mean squared distance [cm^2] of the roll-out from the frames.
     squared = 1e4 * ((positions - target) ** 2).sum(-1).mean()
     assert model.unit == "cm²" and model.history[0]["loss"] == pytest.approx(squared, rel=1e-2)
     assert model.summary["training_frames"] == 40
     loaded = TrainedModel.load(model.save(tmp_path / "model.safetensors"))
-    again = roll_out(loaded, tube_dress(), swaying(40)).positions
+    again = roll_out(loaded, tube_dress(), motion).positions
     assert np.array_equal(again, positions)
-    still = roll_out(loaded, tube_dress(), swaying(40), quasi_static=True).positions
+    still = roll_out(loaded, tube_dress(), motion, quasi_static=True).positions
     assert np.abs(still - positions).max() < 2e-5  # it has no dynamics

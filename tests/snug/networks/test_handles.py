@@ -12,8 +12,7 @@ from snug.body.skeleton import rotation_matrices
 from snug.named_recipes import HANDLES
 from snug.networks.garment_network import make_network, perceptron
 from snug.networks.handles import WIDTHS, shape_functions, span
-from snug.training.train_network import train_network
-from tests.snug.training.dressing import swaying, tube_dress
+from tests.snug.training.dressing import short, swaying, tube_dress
 
 COUNT = 20
 
@@ -61,9 +60,7 @@ def test_a_seed_draws_the_perceptron_before_the_last_layer():
 
 def test_dynamic_handles_see_the_past_and_stay_in_the_space_of_static_ones():
     motion, dressed = swaying(12), tube_dress()
-    model = train_network(
-        "handles-80-dynamic", dressed, [motion], steps=3, seed=0, recipe=HANDLES, progress=False
-    )
+    model = short("handles-80-dynamic", motions=[motion], steps=3, recipe=HANDLES)
     columns, _ = model.network.offset_space()
     assert np.abs(columns.numpy() - span(shape_functions(dressed.garment, 80))).max() < 1e-6
     features = torch.randn(1, 4, len(model.network.input_mean))

@@ -10,8 +10,7 @@ from snug.motion.motion import Motion
 from snug.named_recipes import NCS
 from snug.networks.garment_network import make_network
 from snug.networks.ncs import DESCRIBED, LEAD, POSE_NUMBERS, RATES, joint_motion
-from snug.training.optimisation_step import Trainer
-from tests.snug.training.dressing import leaning, swaying, tube_dress
+from tests.snug.training.dressing import leaning, make_trainer, swaying, tube_dress
 
 INPUTS = POSE_NUMBERS + len(DESCRIBED) * RATES
 
@@ -69,7 +68,7 @@ def test_strange_codes_teach_the_decoder_alone_and_not_by_inertia(network):
 
 
 def test_a_window_begins_with_the_state_that_its_lead_leaves():
-    trainer = Trainer("ncs", tube_dress(), [swaying(40)], steps=1, seed=0, recipe=NCS)
+    trainer = make_trainer(NCS, "ncs")
     windows = np.array([0, 4, 20])
     batch = trainer.data.batch(windows)
     state = trainer.start_state(batch.frames)

@@ -13,8 +13,7 @@ import torch
 from reference_sim import energies
 from snug.recipe import TERMS, Recipe, RecipeError, find_energy
 from snug.training.physics_loss import PhysicsLoss
-from snug.training.train_network import train_network
-from tests.snug.training.dressing import swaying, tube_dress
+from tests.snug.training.dressing import PLAIN, short, tube_dress
 
 # What a user writes: a definition, and no derivative.
 SOURCE = """
@@ -39,7 +38,6 @@ class Tether(Energy):
         apart = u[..., 0, :] - torch.as_tensor(self.home).to(u)
         return self.stiffness * apart.square().sum(-1) ** 2
 """
-PLAIN = Recipe(name="plain", smoothing=0, mixed=0.0, batch=4)
 
 
 @pytest.fixture
@@ -52,13 +50,6 @@ def tethered(tmp_path, monkeypatch):
     monkeypatch.setattr(energies, "__all__", [*energies.__all__, "Tether"])
     yield replace(PLAIN, name="tethered", terms=(*TERMS, "tether"))
     sys.modules.pop("reference_sim.energies.tether", None)
-
-
-def trained(recipe, steps=6, **options):
-    return train_network(
-        "snug", tube_dress(), [swaying(20)], steps=steps, seed=1, recipe=recipe, progress=False, every=2,
-        **options,
-    )  # fmt: skip
 
 
 @pytest.mark.parametrize("kernels", [True, False])
@@ -86,7 +77,7 @@ def test_its_gradient_is_that_of_finite_differences(tethered, kernels):
 
 @pytest.mark.parametrize("kernels", [True, False])
 def test_training_with_it_is_by_all_terms_and_knows_its_recipe(tethered, kernels, tmp_path):
-    model = trained(tethered, kernels=kernels)
+    model = short(recipe=tethered, kernels=kernels)
     last = model.history[-1]
     assert list(last)[2:9] == ["loss", *TERMS[:3], "tether", *TERMS[3:]] and last["tether"] > 0.0
     assert last["loss"] == pytest.approx(sum(last[term] for term in tethered.terms))
@@ -94,7 +85,7 @@ def test_training_with_it_is_by_all_terms_and_knows_its_recipe(tethered, kernels
 
 
 def test_an_energy_of_the_simulator_that_no_recipe_here_has_can_be_trained():
-    rows = trained(replace(PLAIN, terms=(*TERMS, "area_barrier")), steps=2).history
+    rows = short(recipe=replace(PLAIN, terms=(*TERMS, "area_barrier")), steps=2).history
     assert np.isfinite(rows[-1]["loss"]) and "area_barrier" in rows[-1]
 
 

@@ -12,14 +12,9 @@ from snug.training import captured_step, contact_planes
 from snug.training.captured_step import CapturedTrainer
 from snug.training.device import CudaGraph
 from snug.training.divergence_guard import SETTLING
-from snug.training.optimisation_step import Trainer
-from tests.snug.training.dressing import PLAIN, swaying, tube_dress
+from tests.snug.training.dressing import PLAIN, make_trainer, swaying
 
 UNCAPTURED = 1  # step in single operations; three on a GPU, which compile
-
-
-def made(recipe, kind="snug", trainer=Trainer):
-    return trainer(kind, tube_dress(), [swaying(48)], steps=20, seed=0, recipe=recipe, kernels=False)
 
 
 class Replayed(CudaGraph):
@@ -49,10 +44,11 @@ def overwrite(held, new):
 def capturing(monkeypatch, recipe, **options):
     """A trainer whose step is captured, and one that takes the same steps in single operations."""
     monkeypatch.setattr(captured_step, "UNCAPTURED", UNCAPTURED)
-    plain = made(recipe, **options)
+    options = {"motions": [swaying(48)], "kernels": False, **options}
+    plain = make_trainer(recipe, **options)
     for module in ("captured_step", "contact_cache_torch"):
         monkeypatch.setattr(f"snug.training.{module}.CudaGraph", Replayed)
-    captured = made(recipe, trainer=CapturedTrainer, **options)
+    captured = make_trainer(recipe, trainer=CapturedTrainer, **options)
     assert captured.capturable
     return plain, captured
 
@@ -116,11 +112,11 @@ def test_what_a_gpu_compiles_is_traced_whole(monkeypatch):
     def traced(function, device):
         return torch.compile(function, dynamic=False, fullgraph=True, backend="eager")
 
-    plain = made(PAPER)
+    plain = make_trainer(PAPER, kernels=False)
     for module in ("optimisation_step", "training_set", "physics_loss", "contact_planes",
                    "contact_cache_torch"):  # fmt: skip
         monkeypatch.setattr(f"snug.training.{module}.compiled", traced)
-    compiled = made(PAPER)
+    compiled = make_trainer(PAPER, kernels=False)
     for number in range(2):
         expected, losses = plain.step(number), compiled.step(number)
         assert losses == pytest.approx(expected, rel=1e-6)

@@ -17,13 +17,8 @@ from snug.training import contact_planes
 from snug.training.contact_cache import ContactCache, Patch
 from snug.training.contact_cache_torch import TensorContactCache
 from snug.training.device import CPU
-from snug.training.optimisation_step import Trainer
 from snug.training.physics_loss import STATIC
-from tests.snug.training.dressing import PLAIN, planes_of, swaying, tube_dress
-
-
-def made(recipe, *, kernels, kind="snug"):
-    return Trainer(kind, tube_dress(), [swaying(144)], steps=20, seed=0, recipe=recipe, kernels=kernels)
+from tests.snug.training.dressing import PLAIN, make_trainer, planes_of, swaying, tube_dress
 
 
 @pytest.mark.parametrize(
@@ -41,7 +36,7 @@ def test_definitions_train_as_the_kernels_do(kind, recipe, monkeypatch):
     # No frame twice in a step: there its anchors would walk once by torch, and twice by the kernels.
     monkeypatch.setattr(contact_planes, "REFRESH", 0.0)
     recipe = replace(recipe, window_stride=3 if kind == "snug" else 1)
-    fast, slow = (made(recipe, kernels=k, kind=kind) for k in (True, False))
+    fast, slow = (make_trainer(recipe, kind, motions=[swaying(144)], kernels=k) for k in (True, False))
     if fast.contact and slow.contact:  # the torch search finds the closest face where the walk may be rough
         tensors, facts = fast.contact.state()
         changed = torch.arange(fast.data.frames)

@@ -7,19 +7,14 @@ from dataclasses import replace
 import torch
 
 from snug.recipe import DEFAULT
-from snug.training.optimisation_step import Trainer
-from tests.snug.training.dressing import swaying, tube_dress
+from tests.snug.training.dressing import make_trainer, swaying
 
 RECIPE = replace(DEFAULT, mixed=0.0, h0_sigma=0.0)
 MOTIONS = [swaying(12), swaying(9, name="slow", degrees=10.0)]
 
 
-def made(recipe=RECIPE, kind="snug", steps=12):
-    return Trainer(kind, tube_dress(), MOTIONS, steps=steps, seed=0, recipe=recipe)
-
-
 def test_with_weights_that_stand_still_what_is_remembered_becomes_a_roll_out():
-    trainer = made(replace(RECIPE, learning_rate=1e-12, window=3), steps=60)
+    trainer = make_trainer(replace(RECIPE, learning_rate=1e-12, window=3), motions=MOTIONS, steps=60)
     for number in range(60):
         trainer.step(number)
     assert trainer.hidden_states is not None
@@ -37,5 +32,6 @@ def test_with_weights_that_stand_still_what_is_remembered_becomes_a_roll_out():
 
 
 def test_nothing_is_remembered_where_each_window_has_another_body():
-    assert made(replace(RECIPE, shape_range=1.0)).hidden_states is None and made().hidden_states is not None
-    assert made(replace(RECIPE, shape_range=1.0, shape_of="clip", mixed=1.0)).hidden_states is not None
+    recipe = replace(RECIPE, shape_range=1.0)
+    assert make_trainer(recipe).hidden_states is None and make_trainer(RECIPE).hidden_states is not None
+    assert make_trainer(replace(recipe, shape_of="clip", mixed=1.0)).hidden_states is not None

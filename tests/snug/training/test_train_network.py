@@ -12,15 +12,8 @@ from snug.networks import trained_model
 from snug.networks.trained_model import ModelFileError, TrainedModel
 from snug.recipe import DEFAULT
 from snug.training.augmentation import augment
-from snug.training.optimisation_step import Trainer
-from snug.training.train_network import train_network, untrained_model
-from tests.snug.training.dressing import PLAIN, make_trainer, swaying, tube_dress
-
-
-def short(kind="snug", *, steps=60, seed=0, recipe=PLAIN, motions=None, **options):
-    clips = motions or [swaying(30)]
-    options = {"progress": False, "every": 10, **options}
-    return train_network(kind, tube_dress(), clips, steps=steps, seed=seed, recipe=recipe, **options)
+from snug.training.train_network import untrained_model
+from tests.snug.training.dressing import PLAIN, make_trainer, short, swaying, tube_dress
 
 
 @pytest.mark.parametrize(
@@ -42,7 +35,7 @@ SHAPED = replace(DEFAULT, shape_range=3.0, shape_of="clip")
 
 def test_each_mixed_clip_has_a_body_of_its_own_and_given_motions_the_mean_one():
     def data(seed):
-        return Trainer("snug", tube_dress(), [swaying(30)], steps=1, seed=seed, recipe=SHAPED).data
+        return make_trainer(SHAPED, seed=seed).data
 
     mine, dressed = data(0), tube_dress()
     drawn = mine.shapes[1:]
@@ -74,7 +67,7 @@ def test_files_that_are_no_models_are_named(tmp_path, monkeypatch):
 @pytest.mark.parametrize(
     ("given", "message"),
     [
-        ({"kind": "supervised"}, "needs trajectories"),
+        ({"kind": "supervised", "trajectories": None}, "needs trajectories"),
         ({"steps": 0}, "steps=0"),
         ({"motions": [swaying(30), swaying(30, fps=60.0)]}, "one frame rate"),
         ({"kind": "gnn"}, r"'gnn'.*snug, pbns, supervised"),

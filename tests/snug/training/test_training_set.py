@@ -6,14 +6,13 @@ import numpy as np
 
 from snug.body.skeleton import JOINT
 from snug.motion.motion import Motion
-from snug.training.optimisation_step import Trainer
 from snug.training.training_set import TrainingSet
-from tests.snug.training.dressing import PLAIN, swaying, tube_dress
+from tests.snug.training.dressing import PLAIN, make_trainer, swaying, tube_dress
 
 
 def test_windows_stay_within_a_motion_and_all_come_by():
     clips = [swaying(9, name="a"), swaying(7, name="b")]
-    trainer = Trainer("snug", tube_dress(), clips, steps=1, seed=0, recipe=replace(PLAIN, batch=4))
+    trainer = make_trainer(replace(PLAIN, batch=4), motions=clips)
     starts = set()
     for _ in range(3):
         frames = trainer.data.batch(trainer.draw(), None).frames

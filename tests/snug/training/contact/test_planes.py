@@ -15,15 +15,9 @@ from snug.recipe import DEFAULT
 from snug.training import contact_planes
 from snug.training.augmentation import augment
 from snug.training.contact_planes import MARKED, NEAR, REACH
-from snug.training.optimisation_step import Trainer
-from tests.snug.training.dressing import PLAIN, swaying, tube_dress
+from tests.snug.training.dressing import PLAIN, make_trainer, swaying, tube_dress
 
 MOTIONS = [swaying(30), swaying(11, name="slow", degrees=10.0)]
-
-
-def made(motions=MOTIONS, kernels=True, **options):
-    recipe = replace(PLAIN, **options)
-    return Trainer("snug", tube_dress(), motions, steps=9, seed=0, recipe=recipe, kernels=kernels)
 
 
 def test_across_a_side_lies_the_face_that_shares_it():
@@ -33,7 +27,7 @@ def test_across_a_side_lies_the_face_that_shares_it():
 
 @pytest.mark.parametrize("kernels", [True, False])
 def test_what_is_no_number_or_not_trusted_moves_no_anchor(kernels):
-    trainer = made(kernels=kernels)
+    trainer = make_trainer(motions=MOTIONS, kernels=kernels)
     contact = trainer.contact
     before = [torch.as_tensor(table).clone() for table in (contact.cache.faces, contact.cache.barycentric)]
 
@@ -61,7 +55,7 @@ def patch_of(contact, motion, frames, betas):
 
 @pytest.mark.parametrize("kernels", [True, False])
 def test_a_sampled_shape_is_touched_where_its_body_is(kernels):
-    trainer = made(shape_range=3.0, kernels=kernels)
+    trainer = make_trainer(replace(PLAIN, shape_range=3.0), motions=MOTIONS, kernels=kernels)
     contact = trainer.contact
     betas = np.random.default_rng(2).uniform(-3, 3, (2, 10))
     batch = trainer.data.batch(np.array([4, 17]), betas)  # windows of the first motion begin at every frame
@@ -73,7 +67,8 @@ def test_a_sampled_shape_is_touched_where_its_body_is(kernels):
 
 @pytest.mark.parametrize("kernels", [True, False])
 def test_a_clip_of_another_shape_is_touched_where_its_body_is(kernels):
-    trainer = made(mixed=3.0, shape_range=3.0, shape_of="clip", kernels=kernels)
+    recipe = replace(PLAIN, mixed=3.0, shape_range=3.0, shape_of="clip")
+    trainer = make_trainer(recipe, motions=MOTIONS, kernels=kernels)
     contact, data = trainer.contact, trainer.data
     assert (contact.bodies.kept is not None) == kernels
     clips = [*MOTIONS, *augment(MOTIONS, trainer.recipe, vertices=trainer.dressed.vertices, seed=0)]
@@ -89,7 +84,7 @@ def test_a_clip_of_another_shape_is_touched_where_its_body_is(kernels):
 def propagated(motions, frame, monkeypatch):
     """The frames that have the anchors of `frame`, of 41, once it alone has been searched in a step."""
     monkeypatch.setattr(contact_planes, "REFRESH", 1 / 48)  # one frame a step
-    trainer = made(motions)
+    trainer = make_trainer(motions=motions)
     contact = trainer.contact
     searched = []
     requery = contact.cache.requery
@@ -123,7 +118,7 @@ def test_nothing_is_propagated_to_a_frame_in_which_the_body_is_elsewhere(monkeyp
 
 
 def test_each_part_of_an_epoch_passes_over_all_motions():
-    trainer = made([swaying(402)])
+    trainer = make_trainer(motions=[swaying(402)])
     count = len(trainer.data.starts)
     drawn = np.concatenate([trainer.draw() for _ in range(count // trainer.windows)])
     assert len(np.unique(drawn)) == len(drawn) == count
