@@ -60,7 +60,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from benchmarks.external.scene_files import write_scene  # loads the simulator
 
         simulation = find_method("simulation").make(models=folder, seed=0) if options.reference else None
-        write_scene(folder, plan.scenes[0], scene, preset=plan.preset.name, simulation=simulation)
+        write_scene(folder, plan.scenes[0], scene, preset=plan.study.sizes.name, simulation=simulation)
     except RuntimeError as error:  # a simulation that did not stay finite
         raise StudyError(str(error)) from error
     print(f"{scene.name}: {scene.frames} frames of {scene.cloth.vertex_count} vertices in {folder}")

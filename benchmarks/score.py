@@ -170,8 +170,7 @@ def plan_score(
         # Without a report nobody looks at times and gaps of what the roll-out is compared with.
         entry = replace(cell.entry, timed=cell.entry.timed and report)
         cells.append(replace(cell, entry=entry, suites=tuple(dict.fromkeys(suites))))
-    suites = (*(() if rest_mesh else plan.suites), SOLVED_AGAIN)
-    return replace(plan, cells=tuple(cells), suites=tuple(dict.fromkeys(suites)))
+    return replace(plan, cells=tuple(cells))
 
 
 def _reference(cell: Cell, given: str | Path | Literal[False] | None) -> Cell:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from datetime import datetime
 from functools import cache
@@ -21,7 +21,7 @@ from benchmarks.plan.cell import Cell, TaskId
 from benchmarks.plan.choose_cells import ReadStudy, choose_cells
 from benchmarks.plan.motions import Motions, split_motions
 from benchmarks.plan.study import Study, StudyError, nearest
-from benchmarks.presets import Preset, find_preset
+from benchmarks.presets import find_preset
 from benchmarks.provenance import usable_cores
 from benchmarks.results.protocol import NUMBER, OWN
 from benchmarks.results.row import ResultsError
@@ -67,31 +67,25 @@ class Network:
 class Plan:
     """Everything to be done.
 
-    inputs: the user's files, as read. retry: whether tasks that have failed are done again; fresh: all that
-    the folder holds is forgotten first. workers: processes side by side where nothing is timed.
-    metrics: modules of metrics that are not the project's, see benchmarks.plan.user_files. scheduler: address
-    of a cluster that does what is not timed; empty: this machine does. trained: folder whose networks take
-    the place of trainings; None: networks are trained. study: what was asked, as written. Raises StudyError
-    where two cells have the files of one: slashes of names become hyphens there.
+    metrics: modules of metrics that are not the project's, see benchmarks.plan.user_files. inputs: the user's
+    files, as read. retry: whether tasks that have failed are done again; fresh: all that the folder holds is
+    forgotten first. workers: processes side by side where nothing is timed. scheduler: address of a cluster
+    that does what is not timed; empty: this machine does. Raises StudyError where two cells have the files of
+    one: slashes of names become hyphens there.
     """
 
-    preset: Preset
+    study: Study
     cells: tuple[Cell, ...]
-    suites: tuple[str, ...] = ("speed",)
     cases: tuple[Case, ...] = ()
     metrics: tuple[str, ...] = ()
     motions: Motions = field(default_factory=Motions)
     inputs: Inputs = field(default_factory=Inputs)
-    seeds: tuple[int, ...] = (0,)
-    device: str = "cpu"
     folder: Path = Path()
     command: str = ""
     retry: bool = False
     fresh: bool = False
     workers: int = 1
     scheduler: str = ""
-    trained: Path | None = None
-    study: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         cell_of: dict[str, Cell] = {}
@@ -117,7 +111,7 @@ class Plan:
     @property
     def cut_motions(self) -> dict[str, str]:
         """Motion of a user's file -> which of its frames are measured, where these are not all."""
-        most = self.preset.frames
+        most = self.study.sizes.frames
         return {
             name: f"the first {most} of {motion.frames} frames"
             for name, motion in self.inputs.motions.items()
@@ -134,7 +128,7 @@ class Plan:
         wanted = dict.fromkeys(names)
         motions = [read[name] for name in wanted if name in read]
         motions += embedded_motions(name for name in wanted if name not in read)
-        return open_assets(self.preset, motions, self.garments, inputs=self.inputs, training=train)
+        return open_assets(self.study.sizes, motions, self.garments, inputs=self.inputs, training=train)
 
 
 def runs(cell: Cell) -> bool:
@@ -157,16 +151,16 @@ def protocol_of(cell: Cell, plan: Plan) -> str:
     Settings are the preset, the body, the garment with its material, the motion, the reference, and what the
     project's own networks train on.
     """
-    scene, inputs = cell.scene, plan.inputs
+    scene, inputs, sizes = cell.scene, plan.inputs, plan.study.sizes
     given = scene.dressed and (inputs.body or scene.motion in inputs.motions)
-    if given or plan.preset != find_preset(plan.preset.name) or not _is_declared(scene, plan.preset.name):
+    if given or sizes != find_preset(sizes.name) or not _is_declared(scene, sizes.name):
         return OWN
     if any(c.entry.role == "reference" and c.entry.module == STORED for c in plan.cells if c.scene == scene):
         return OWN
     network = network_of(cell)
     if network is None or network.users_training:
         return NUMBER
-    trained_on = TRAIN[: plan.preset.train_motions]
+    trained_on = TRAIN[: sizes.train_motions]
     return NUMBER if plan.motions.train == trained_on and not inputs.motions else OWN
 
 
@@ -224,22 +218,16 @@ def make_plan(
         raise StudyError(f"--workers {workers}: give a whole number, 1 or more")
     read = read_files(study, scenes)
     cells, cases = choose_cells(read)
-    asked = {suite for cell in cells for suite in cell.suites} | {case.suite for case in cases}
     return Plan(
-        preset=study.sizes,
-        suites=tuple(part for part in study.parts if part in asked),
+        study=study,
         cells=cells,
         cases=cases,
         metrics=choose_metrics(study),
         motions=read.motions,
         inputs=read.inputs,
-        seeds=study.seeds,
-        device=study.device,
         folder=folder,
         workers=workers,
         scheduler=scheduler,
-        trained=study.trained,
-        study=study.written,
         **further,
     )
 
@@ -254,7 +242,7 @@ def plan_scene(study: Study, name: str) -> Plan:
     if name not in read.scenes:
         raise StudyError(f"no scene '{name}'; {nearest(name, list(read.scenes))}")
     cell = Cell(read.scenes[name].at(study.sizes), find_method("simulation"), 0, ("speed",))
-    return Plan(preset=study.sizes, cells=(cell,), motions=read.motions, inputs=read.inputs)
+    return Plan(study=study, cells=(cell,), motions=read.motions, inputs=read.inputs)
 
 
 def read_files(study: Study, scenes: Sequence[Scene] = ()) -> ReadStudy:

@@ -149,11 +149,11 @@ def held(folder: Path) -> Iterator[None]:
 def describe(plan: Plan) -> str:
     """Return the plan in a few lines, and one line for each task. Starts nothing, writes nothing."""
     folder = RunFolder(plan.folder / "none" if plan.fresh else plan.folder)
-    skipped, stage = sum(not runs(cell) for cell in plan.cells), ""
+    study, skipped, stage = plan.study, sum(not runs(cell) for cell in plan.cells), ""
     lines = [
-        f"preset {plan.preset.name}: {plan.preset.description}",
+        f"preset {study.sizes.name}: {study.sizes.description}",
         f"folder {plan.folder}",
-        f"suites {', '.join(plan.suites)}; seeds {', '.join(map(str, plan.seeds))}; device {plan.device}; "
+        f"parts {', '.join(study.parts)}; seeds {', '.join(map(str, study.seeds))}; device {study.device}; "
         f"{plan.scheduler or f'{plan.workers} workers'}, timed cells alone here",
         *(str(file.path) for file in (plan.inputs.body, plan.inputs.garment) if file),
         f"{len(plan.cells)} cells, {skipped} skipped, {len(plan.cases)} cases",

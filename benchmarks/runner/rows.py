@@ -55,7 +55,7 @@ def rows_of_cell(cell: Cell, plan: Plan, tasks: Mapping[TaskId, Task], outcomes:
                 status, reason = measured.status, measured.reason or reason
             metrics = dict(measured.result)
             if cell.timed:
-                costs, remark = clock_costs(cell, plan.preset.repeats, outcomes)
+                costs, remark = clock_costs(cell, plan.study.sizes.repeats, outcomes)
                 metrics |= costs
                 reason = reason or remark
             elif (declared_ms := cell.entry.declared_ms or outcome.result.get("declared_ms")) is not None:

@@ -35,7 +35,7 @@ class RunLog:
         body, garment = plan.inputs.body, plan.inputs.garment
         self.folder = RunFolder(plan.folder)
         self.origin = {
-            "commit": provenance.commit(), "preset": plan.preset.name, "protocol": NUMBER,
+            "commit": provenance.commit(), "preset": plan.study.sizes.name, "protocol": NUMBER,
             # Only training uses an accelerator: its rows name it, see networks.train.
             "hardware": provenance.hardware_line(provenance.hardware()),
         }  # fmt: skip
@@ -44,8 +44,8 @@ class RunLog:
         before = self.folder.read_config() if self.folder.config_path.is_file() else {}
         self.config: dict[str, Any] = {
             "command": plan.command,
-            "study": dict(plan.study),
-            "preset": plan.preset.name,
+            "study": dict(plan.study.written),
+            "preset": plan.study.sizes.name,
             "protocol": {"number": NUMBER, "digest": DIGEST},
             "motions": {
                 f"{role} {garment}": list(names)
@@ -56,15 +56,15 @@ class RunLog:
             "split": plan.motions.split,
             "body": [body.path.name, body.digest] if body else "of the package",
             "garment": [garment.path.name, garment.digest] if garment else "tailored",
-            "seeds": list(plan.seeds),
+            "seeds": list(plan.study.seeds),
             "clock": {"name": "time.perf_counter", "threads": 1, "cells_at_a_time": 1},
             "workers": plan.workers,
             "commit": self.origin["commit"],
             "started": now(),
             "finished": None,
-            "hardware": provenance.hardware(plan.device),
+            "hardware": provenance.hardware(plan.study.device),
             "versions": provenance.versions(),
-            "preset_values": dataclasses.asdict(plan.preset),
+            "preset_values": dataclasses.asdict(plan.study.sizes),
             "stages": [],
             "test_looks": before.get("test_looks") or [],
             # What the rows there mean, until there are others.

@@ -90,7 +90,7 @@ class Schedule:
     """The tasks of one plan."""
 
     def __init__(self, plan: Plan) -> None:
-        self.plan, self.preset = plan, plan.preset
+        self.plan, self.preset = plan, plan.study.sizes
         self.folder = RunFolder(plan.folder)
 
     def tasks(self) -> Iterator[Task]:
@@ -168,8 +168,8 @@ class Schedule:
             "kind": "network", "name": network.task_id[1], "label": network.label, "silent": True,
             "files": (self.folder.relative(job.path(self.folder)),),
         }  # fmt: skip
-        if self.plan.trained is not None and network.training is not None:
-            source, refusal = pretrained_network(job, self.plan.trained)
+        if self.plan.study.trained is not None and network.training is not None:
+            source, refusal = pretrained_network(job, self.plan.study.trained)
             if source or not network.users_training:
                 return Task(
                     stage="pretrained networks", run=partial(take, job, source or Path()), skip=refusal,
@@ -187,14 +187,14 @@ class Schedule:
         kind, steps_of = (chosen.kind, chosen.steps_of) if chosen else (network.name, "")
         steps = self.preset.steps_of(steps_of or network.name, kind)
         steps *= LONGEST if chosen and chosen.converged else 1
-        inputs = self._machine(self.plan.device) | self._of_body(network.garment) | {
+        inputs = self._machine(self.plan.study.device) | self._of_body(network.garment) | {
             "training": [network.name, chosen], "seed": network.seed, "steps": steps,
             "motions": {name: self._motion(name) for name in motions},
             "held out": {name: self._motion(name) for name in held_out},
         }  # fmt: skip
         digests = {name: digest(value) for name, value in inputs.items()}
         return NetworkTraining(
-            network=network, steps=steps, motions=motions, held_out=held_out, device=self.plan.device,
+            network=network, steps=steps, motions=motions, held_out=held_out, device=self.plan.study.device,
             reads=tuple(task.id for task in self.ground_truth(network)), inputs=digests,
             key=digest(digests | software(*RUNNING, *users_code(network.declared_in))),
         )  # fmt: skip

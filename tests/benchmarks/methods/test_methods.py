@@ -77,9 +77,7 @@ def run(tmp_path_factory):
         for entry in CHOSEN
         if scene.name == "hanging_sheet" or runs_in(entry, scene.name)
     )
-    plan = dataclasses.replace(
-        plan_of(folder.path), preset=TINY, cells=cells, motions=Motions((TRAIN,), (TEST,))
-    )
+    plan = plan_of(folder.path, preset=TINY, cells=cells, motions=Motions((TRAIN,), (TEST,)))
     assets = open_assets(TINY, embedded_motions([TRAIN, TEST]), ["tshirt"])
     runner = Runner(tasks_of(plan), Cache(folder))
     executor = InProcess(folder, assets)

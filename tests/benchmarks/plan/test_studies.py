@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.plan.study import located, parse_setting, read_study, study_names
+from benchmarks.plan.study import parse_setting, read_study, study_names
 from benchmarks.presets import find_preset
 from benchmarks.publish import published_studies
 from reports.blocks import FIGURES
@@ -87,7 +87,7 @@ def test_every_study_of_the_package_has_a_question_and_can_be_planned(name):
     assert study.question.endswith((".", "?")) or ":" in study.question
     words = ("--methods", "simulation") if name in ("paper", "full") else ()
     plan = planned(name, *words)
-    assert set(plan.suites) <= set(study.parts) and plan.study["name"] == name
+    assert plan.study.written["name"] == name
     cells = [cell for cell in plan.cells if cell.entry.skip(cell.scene) is None]
     assert {cell.scene.name for cell in cells} == {scene.name for scene in plan.scenes}
 
@@ -98,12 +98,3 @@ def test_published_pictures_are_those_that_reports_draw():
     for name in published_studies():
         for picture in read_study(name).show.pictures:
             assert any(fnmatch(f"{picture}.png", pattern) for pattern in patterns), picture
-
-
-def test_a_fault_of_no_field_of_the_file_gets_none_of_its_lines(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text("# mine\n\nseeds = [0]\n\n[sizes]\n# small\nframes = 4\n")
-    for field, line in (("seeds", 3), ("sizes.frames", 7), ("sizes.steps", 5), ("trained", 0)):
-        place = f"{path}: line {line}: " * bool(line)
-        assert located(f"{field}: wrong", str(path), []) == f"{place}{field}: wrong"
-    assert located("seeds: wrong", str(path), ["--seeds", "1"]) == "seeds: wrong"

@@ -15,7 +15,6 @@ from benchmarks.methods.outside import program
 from benchmarks.plan import user_files
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
-from benchmarks.plan.plan import Plan
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule
 from snug.recipe import DEFAULT, RecipeError
@@ -30,7 +29,7 @@ from tests.benchmarks.plan.outside_files import (
     TINY,
     as_before,
 )
-from tests.benchmarks.runner.tasks_by_hand import dressed_scene
+from tests.benchmarks.runner.tasks_by_hand import dressed_scene, plan_of
 from tests.benchmarks.test_provenance import forget
 
 _as_before = pytest.fixture(autouse=True)(as_before)
@@ -152,7 +151,7 @@ def test_a_method_brings_the_training_of_its_network(tmp_path):
         needs_body=True, trained="windy", training=Training("snug", recipe), options={"kind": "windy"},
     )  # fmt: skip
     cell = Cell(dressed_scene("kick", preset=TINY), entry, 0, ("garments",))
-    plan = Plan(preset=TINY, cells=(cell,), folder=tmp_path, motions=Motions(("walk",), ("kick",)))
+    plan = plan_of(tmp_path, preset=TINY, cells=(cell,), motions=Motions(("walk",), ("kick",)))
     (task,) = (task for task in Schedule(plan).tasks() if task.kind == "network")
     job = Schedule(plan).training(plan.networks[0])
     assert job.network.training == Training("snug", recipe)

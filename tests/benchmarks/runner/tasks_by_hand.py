@@ -15,6 +15,7 @@ from benchmarks.methods.declared_networks import TRAININGS
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.plan import Network, Plan
+from benchmarks.plan.study import Study
 from benchmarks.presets import Preset, find_preset
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
@@ -72,22 +73,18 @@ def context(folder, assets: Assets | None = None, **fields) -> Context:
 
 def plan_of(folder: Path, *names: str, scene: str = "free_fall", how: str = "", **changes) -> Plan:
     """A plan of these methods in one scene. how: what those do that are no simulation, see misbehaving."""
-    preset = changes.get("preset", TINY)
+    study = Study(sizes=changes.pop("preset", TINY), trained=changes.pop("trained", None))
     wrong = {
         "module": "tests.benchmarks.runner.misbehaving", "options": {"how": how}, "batched": True,
         "gives_first_frame": True,
     }  # fmt: skip
-    declared = next(declared for declared in SCENES if declared.name == scene).at(preset)
+    declared = next(declared for declared in SCENES if declared.name == scene).at(study.sizes)
     entries = [
         dataclasses.replace(find_method(name), **wrong if how and name != "simulation" else {})
         for name in names
     ]
-    values = {
-        "preset": preset, "suites": ("speed",), "cases": (), "seeds": (0,), "device": "cpu",
-        "cells": tuple(Cell(declared, entry, 0, ("speed",)) for entry in entries),
-        "folder": folder, "command": "",
-    }  # fmt: skip
-    return Plan(**(values | changes))
+    cells = tuple(Cell(declared, entry, 0, ("speed",)) for entry in entries)
+    return Plan(**{"study": study, "cells": cells, "folder": folder} | changes)
 
 
 def finish(plan: Plan, *stages: str, processes: bool = False) -> Runner:

@@ -154,7 +154,7 @@ def test_a_training_of_equal_data_has_the_steps_and_clips_that_it_declares(tmp_p
         mixed = training.simulated.mixed if training.simulated else 0
         assert sum(kind == "clips" for kind, _ in task.reads) == mixed
         assert task.motions == ("walk", "run")
-        assert task.steps == plan.preset.steps["snug"] * (LONGEST if training.converged else 1)
+        assert task.steps == plan.study.sizes.steps["snug"] * (LONGEST if training.converged else 1)
         assert task.held_out == (("bow",) if training.converged else ())
 
 

@@ -107,7 +107,7 @@ def test_a_run_from_files_simulates_and_trains_nothing_but_a_users_own(made, tmp
         "tshirt/untrained-seed0": "training", "tshirt/mine-seed0": "training",
     }  # fmt: skip
     assert "data" not in {task.kind for task in tasks}
-    assert "data" in {task.kind for task in tasks_of(dataclasses.replace(plan, trained=None))}
+    assert "data" in {task.kind for task in tasks_of(plan_with(tmp_path, "pbns", "supervised", "untrained"))}
 
 
 def test_every_row_of_a_pretrained_network_says_so(made, tmp_path):

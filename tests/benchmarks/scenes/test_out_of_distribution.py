@@ -13,7 +13,6 @@ from benchmarks.methods.networks import CollisionPostProcessing
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.roll_out import EXTRAPOLATION, measure_extrapolation
 from benchmarks.plan.cell import Cell
-from benchmarks.plan.plan import Plan
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import model_path
 from benchmarks.runner.measurements import measured
@@ -31,6 +30,7 @@ from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
 from snug.training.train_network import untrained_model
 from tests.benchmarks.plan.planned import planned
+from tests.benchmarks.runner.tasks_by_hand import plan_of
 
 SMOKE = find_preset("smoke")
 
@@ -162,16 +162,15 @@ def test_a_network_whose_shirt_is_on_no_body_has_diverged(roll_outs, tmp_path, m
         ("cell", cell.name): Outcome(*verdict, result={"frames": 5}, files=("x",)),
         ("metrics", cell.name): Outcome(*ended, result=values),
     }
-    rows = list(rows_of_cell(cell, Plan(preset=SMOKE, cells=(cell,), folder=tmp_path), {}, outcomes))
+    rows = list(rows_of_cell(cell, plan_of(tmp_path, preset=SMOKE, cells=(cell,)), {}, outcomes))
     assert {row.status for row in rows} == {expected} and len(rows) == len(values) >= 4
     lost = "a vertex came 0.7 m away from the skinned shirt"
     assert {row.reason for row in rows} == {verdict[1] or (lost if expected == "diverged" else "")}
     assert not any(row.metric.startswith("cost/") for row in rows)  # nobody took its time
 
 
-def test_the_task_of_the_settled_shirt_that_serves_all_comes_unasked(tmp_path):
-    words = ("full:extremes", "--scenes", "*splits,*girth_+5", "--methods", "simulation")
-    plan = Plan(preset=SMOKE, cells=planned(*words).cells, folder=tmp_path)
+def test_the_task_of_the_settled_shirt_that_serves_all_comes_unasked():
+    plan = planned("full:extremes", "--scenes", "*splits,*girth_+5", "--methods", "simulation")
     starts = {task.name: task for task in tasks_of(plan) if task.kind == "start"}
     ordinary, splits = "out_of_distribution-ordinary", "out_of_distribution-splits"
     assert list(starts) == [ordinary, splits, "out_of_distribution-girth_+5"]
