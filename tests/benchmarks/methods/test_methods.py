@@ -29,8 +29,6 @@ from benchmarks.runner.rows import rows_of
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.scenes import SCENES
 from reference_sim import Trajectory
-from snug.named_recipes import RECIPES
-from snug.training.physics_loss import static_terms
 from tests.benchmarks.runner.tasks_by_hand import InProcess, dressed_scene, plan_of, small_scene
 
 SIZES = {"frames": 16, "settle_frames": 2, "sheet_cells": 4, "sheet_frames": 5, "gap_samples": 2}
@@ -200,37 +198,6 @@ def test_a_run_that_is_done_again_gives_the_same_and_inputs_are_what_it_takes_as
         rest, shifts = scene.dressed.body.joints()[0], scene.dressed.motion.translations
         assert np.array_equal(pelvis, rest + shifts[last])
     assert Method().inputs(scenes["hanging_sheet"]) is None
-
-
-@pytest.mark.parametrize(
-    ("exchange", "places"), [("springs", [0]), ("printed-bending", [1]), ("pbns-springs", [0, 1])]
-)
-def test_another_material_is_simulated_and_judged_by_the_scenes_own(exchange, places):
-    scene = small_scene("hanging_sheet", cells=4, frames=5)
-    entry = find_method(f"simulation-{exchange}")
-    made = entry.make(models=None, seed=0)
-    made.prepare(scene)
-    energies, declared = made.scene.energies, scene.energies
-    assert [term.name for term in declared] == ["strain", "bending", "gravity"]
-    assert [mine is theirs for mine, theirs in zip(energies, declared)] == [k not in places for k in range(3)]
-    trained = list(static_terms(scene.cloth, RECIPES[exchange]).values())
-    for place in places:  # the very energies that the recipe of that name trains on
-        assert type(energies[place]) is type(trained[place])
-        assert np.array_equal(energies[place].stiffness, trained[place].stiffness)
-    if exchange == "printed-bending":
-        k = scene.cloth.material.bending_stiffness
-        assert (energies[1].stiffness == k).all() and declared[1].stiffness.mean() < 0.5 * k
-    assert np.array_equal(made.scene.start, scene.start)
-    group, trajectory = SceneRollOuts(scene), made.run()
-    assert trajectory.status == "converged"
-    group.roll_outs.append(RollOut(group, entry, trajectory, suites=("validation",)))
-    values = measured(group.roll_outs[0], ("energy",))[0]
-    term = declared[places[0]]
-    judged = np.mean([term.value_and_gradient(frame)[0] for frame in trajectory.positions[2:]])
-    assert values[f"energy/{term.name}"] == pytest.approx(judged, rel=1e-9)
-    # No uncertainty of the reference and no approximation of it: a variant that stands beside its base.
-    assert group.reference is None
-    assert (entry.role, entry.reporting.base) == ("ablation", "simulation")
 
 
 def test_energies_of_judged_frames_are_kept_of_references_baselines_and_networks(run, rows, scenes):

@@ -77,6 +77,23 @@ def test_the_minimiser_of_its_own_energies_leaves_a_network_no_excess(scene, sim
     assert excess(scene, simulations, name, shaken)[0] > 1.0
 
 
+def test_simulations_have_the_constants_that_are_trained_on(scene):
+    def terms(name):
+        method = find_method(f"simulation-{name}").make(models=None, seed=0)
+        method.prepare(scene)
+        return {term.name: term for term in method.scene.energies}
+
+    contact = terms("snug-paper")["collision"]
+    assert (contact.margin, contact.samples) == (0.002, "vertices")
+    assert contact.stiffness.sum() == pytest.approx(1.34e6 * scene.cloth.areas.sum())
+    hinges = terms("snug-printed-bending")["bending"]
+    assert (hinges.stiffness == scene.cloth.material.bending_stiffness).all()
+    pbns = terms("pbns-springs")
+    assert pbns["spring"].stiffness == 15.0 and (pbns["bending"].stiffness == 1e-4).all()
+    assert (pbns["collision"].power, pbns["collision"].margin) == (2, 4e-3)
+    assert set(terms("snug-no-gravity")) == {"strain", "bending", "collision"}
+
+
 @pytest.mark.parametrize("name", ["supervised", "snug-no-strain", "snug-no-collision"])
 def test_what_has_no_minimum_or_learned_vertices_has_no_own_excess(scene, simulations, name):
     assert own_energies(find_method(name)) is None and own_reference(find_method(name)) is None
