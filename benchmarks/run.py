@@ -15,6 +15,7 @@ from benchmarks.declarations import DeclarationError
 from benchmarks.external.roll_out_files import RollOutFileError
 from benchmarks.plan.options import PROGRAM, list_names, make_parser, refuse_former, study_of
 from benchmarks.plan.plan import Plan, make_plan
+from benchmarks.plan.study import StudyError, located
 from benchmarks.runner.task import RunRefused, RunStopped
 from benchmarks.timing import one_thread
 
@@ -22,11 +23,13 @@ from benchmarks.timing import one_thread
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
     command_line = list(sys.argv[1:] if arguments is None else arguments)
+    asked = "default"
     one_thread()
     try:
         refuse_former(command_line)
         options = make_parser().parse_args(command_line)
-        study = study_of(options, options.study)
+        asked = options.study
+        study = study_of(options, asked)
         if options.list:
             print(list_names(study))
             return 0
@@ -40,7 +43,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
             command=shlex.join(["python", "-m", PROGRAM, *command_line]),
         )
     except (ValueError, OSError) as error:  # also the readers' own: each is one line with file and remedy
-        print(f"{PROGRAM}: {' '.join(str(error).split())}", file=sys.stderr)
+        line = " ".join(str(error).split())
+        line = located(line, asked, command_line) if isinstance(error, StudyError) else line
+        print(f"{PROGRAM}: {line}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:
         print(f"{PROGRAM}: interrupted; nothing was written", file=sys.stderr)

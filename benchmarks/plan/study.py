@@ -6,6 +6,7 @@ Every field is an attribute of a dataclass, whose type says what it takes.
 from __future__ import annotations
 
 import difflib
+import re
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass, replace
@@ -179,12 +180,12 @@ def read_study(word: str = "default", options: Sequence[Table] = ()) -> Study:
 
 
 def read_fields(kind: type[Record], path: Path) -> Record:
-    """Return an object of a dataclass from a TOML file. Raises StudyError with file and field."""
+    """Return an object of a dataclass from a TOML file. Raises StudyError with file, line and field."""
     table = _read_table(path)
     try:
         record: Record = _dataclass_of(kind, table)
     except StudyError as error:
-        raise StudyError(f"{path}: {error}") from None
+        raise StudyError(f"{path}: {_line_of(path, str(error).partition(':')[0])}{error}") from None
     return record
 
 
@@ -199,6 +200,37 @@ def find_study(name: str) -> Path:
         f"no study '{name}': name one, or a file or folder with {FILE}; {nearest(name, study_names())}; "
         "those that bring code are in the folder studies of a checkout"
     )
+
+
+def located(message: str, study: str, words: Sequence[str]) -> str:
+    """Return the message of a faulty field behind the file and line of the study that give it.
+
+    A field that the words of the command line give has none.
+    """
+    given = {word.partition("=")[0].lstrip("-").replace("-", "_") for word in words}
+    field = message.partition(":")[0]
+    if field in given or not re.fullmatch(r"[\w.]+", field):
+        return message
+    path = find_study(study.partition(":")[0])
+    place = _line_of(path, field)
+    return f"{path}: {place}{message}" if place else message
+
+
+def _line_of(path: Path, field: str) -> str:
+    """Return where a file gives a field, as "line 3: "; empty where it does not.
+
+    A field within a table on one line has that line.
+    """
+    lines, header = dict[str, int](), ""
+    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+        name = re.split("[=#]", line)[0].replace('"', "").strip()
+        if name.startswith("["):
+            name = header = name.strip("[] ")
+        elif name and header:
+            name = f"{header}.{name}"
+        lines.setdefault(name, number)
+    known = (lines[name] for name in (field, field.rpartition(".")[0]) if name and name in lines)
+    return next((f"line {number}: " for number in known), "")
 
 
 def study_names() -> list[str]:

@@ -10,17 +10,17 @@ from tests.benchmarks.plan.outside_files import METRIC_FILE, SCENE_FILE, as_befo
 
 _as_before = pytest.fixture(autouse=True)(as_before)
 
-FIELDS = [  # study.toml -> field, and what is near it
+FIELDS = [  # study.toml -> line, field, and what is near it
     ("seeds = [", "not readable as TOML"),
-    ("sedes = [0]", "sedes: no field is called 'sedes'; did you mean seeds"),
+    ("sedes = [0]", "study.toml: line 1: sedes: no field is called 'sedes'; did you mean seeds"),
     ("question = 1", "question: 1: give text"),
     ("seeds = [-1]", "seeds: '-1': give at least one whole number"),
     ("split = 'tset'", "split: 'tset': choose from test, validation"),
     ("sizes = 'huge'", "sizes: unknown preset 'huge'; choose from smoke, quick, paper"),
-    ("[sizes]\nbase = 'smoke'\nframe = 3", "sizes.frame: no field is called 'frame'"),
-    ("[parts.garmnts]", "parts.garmnts: no part is called so; choose from garments, "),
-    ("[parts.speed]\nscenes = ['flagg']", "parts.speed.scenes: unknown scene 'flagg'"),
-    ("garment = { units = 'cm' }", "garment: path is absent: give it"),
+    ("[sizes]\nbase = 'smoke'\nframe = 3", "study.toml: line 3: sizes.frame: no field is called 'frame'"),
+    ("[parts.garmnts]", "study.toml: line 1: parts.garmnts: no part is called so; choose from garments, "),
+    ("[parts.speed]\nscenes = ['flagg']", "study.toml: line 2: parts.speed.scenes: unknown scene 'flagg'"),
+    ("garment = { units = 'cm' }", "study.toml: line 1: garment: path is absent: give it"),
     ("garment = { path = 'tshirt.obj' }", "the project has scenes of that name: give the file another"),
 ]
 WORDS = [

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.plan.study import parse_setting, read_study, study_names
+from benchmarks.plan.study import located, parse_setting, read_study, study_names
 from benchmarks.presets import find_preset
 from benchmarks.publish import published_studies
 from reports.blocks import FIGURES
@@ -98,3 +98,12 @@ def test_published_pictures_are_those_that_reports_draw():
     for name in published_studies():
         for picture in read_study(name).show.pictures:
             assert any(fnmatch(f"{picture}.png", pattern) for pattern in patterns), picture
+
+
+def test_a_fault_of_no_field_of_the_file_gets_none_of_its_lines(tmp_path):
+    path = tmp_path / "mine.toml"
+    path.write_text("# mine\n\nseeds = [0]\n\n[sizes]\n# small\nframes = 4\n")
+    for field, line in (("seeds", 3), ("sizes.frames", 7), ("sizes.steps", 5), ("trained", 0)):
+        place = f"{path}: line {line}: " * bool(line)
+        assert located(f"{field}: wrong", str(path), []) == f"{place}{field}: wrong"
+    assert located("seeds: wrong", str(path), ["--seeds", "1"]) == "seeds: wrong"
