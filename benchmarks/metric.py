@@ -158,7 +158,7 @@ class Kept:
 
 @dataclass(eq=False)
 class RollOut(Kept):
-    """Roll-out of one method in a scene. `positions` end before the first frame that is not finite.
+    """Roll-out of a method in a scene. `positions` (T,V,3) [m] end before the first frame that is not finite.
 
     Attributes:
         group: the roll-outs of the scene.
@@ -168,7 +168,6 @@ class RollOut(Kept):
         suites: those that report it.
         quasi_static: (T,V,3) [m] the method's quasi-static solutions, or None.
         counterpart: (T',V,3) [m] roll-out of the same method in the scene's counterpart, or None.
-        positions: (T,V,3) [m] of it that are finite.
     """
 
     group: SceneRollOuts

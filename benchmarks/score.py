@@ -167,7 +167,6 @@ def plan_score(
     cells = []
     for cell in (_reference(cell, reference) for cell in plan.cells):
         suites = (*cell.suites, SOLVED_AGAIN) if report or cell.method == name else cell.suites
-        # Without a report nobody looks at times and gaps of what the roll-out is compared with.
         entry = replace(cell.entry, timed=cell.entry.timed and report)
         cells.append(replace(cell, entry=entry, suites=tuple(dict.fromkeys(suites))))
     return replace(plan, cells=tuple(cells))

@@ -145,8 +145,8 @@ class HemMotion:
         if last - self.first < SHORTEST:
             return {}
         judged = slice(self.first, last)
-        moving, simulated = self.of(positions[:last])[judged], self.of(self.simulated[:last])[judged]
-        quiet = self.of(self.quasi_static[:last])[judged]
+        answers = (positions, self.simulated, self.quasi_static)
+        moving, simulated, quiet = (self.of(answer[:last])[judged] for answer in answers)
         still = quiet if static is None else self.of(static[:last])[judged]
         part, reference = dynamic_part(moving, still), dynamic_part(simulated, quiet)
         gain, lag = response(moving, still, self.axes[judged])

@@ -4,7 +4,6 @@ A frame without intersections may follow another one though a layer went through
 the straight way of every vertex from one frame to the next a vertex meets a triangle, or an edge an edge,
 where the four points are in one plane and their primitives touch (Provot 1997). Broad phase and test are
 those of the package ipctk, by tight inclusion (Wang, Ferguson, Schneider, Jiang, Attene and Panozzo 2021).
-Without the package nothing is measured of that, and nothing of a roll-out that has fallen apart.
 """
 
 from __future__ import annotations

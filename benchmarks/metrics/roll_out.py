@@ -32,7 +32,7 @@ LOST = 0.5  # [m] from the skinned shirt: a vertex so far off is on no body any 
 def measure_extrapolation(roll_out: RollOut) -> dict[str, float]:
     """Return the metrics of a scene that was made hard, each against the same method's ordinary walk."""
     scene, x, whole = roll_out.scene, roll_out.positions, roll_out.trajectory.positions
-    bare = roll_out.scene.skinned
+    bare = scene.skinned
     if scene.dressed is None or bare is None:
         return {}
     worst = float(strains(scene.cloth, whole).max())

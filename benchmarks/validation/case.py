@@ -1,10 +1,5 @@
 """Case: one row whose answer is known before anything is computed, or whose failure has to be reported.
 
-A known answer stands on the function that measures it:
-
-    @known_answer(expected=6.0, tolerance=0.0, reason="three translations and three rotations, no other")
-    def rigid_zero_modes() -> float: ...
-
 A module of cases is imported to list them, so it loads what it measures with where it is used: inside its
 functions, or by names of the faces `reference_sim` and `reference_sim.energies`, which load on first use.
 """

@@ -119,8 +119,7 @@ def angular_momentum_balance() -> float:
 
 @cache
 def _thrown_sheet() -> tuple[np.ndarray, sim.Cloth]:
-    points, faces = jittered_patch(6)
-    cloth = sim.Cloth(0.3 * in_space(points), faces, sim.Material())
+    cloth = flat_cloth(*jittered_patch(6), size=0.3)
     random = np.random.default_rng(2)
     start = cloth.rest_positions + random.normal(0, 0.004, cloth.rest_positions.shape)
     velocity = random.normal(0, 0.5, start.shape)
@@ -138,7 +137,7 @@ def unique_step() -> float:
     bound = SPACING * np.sqrt(COTTON.areal_density / 8 / (COTTON.lame_lambda + COTTON.lame_mu))
     cells = 12
     size = SPACING * cells
-    cloth = flat_cloth(*right_grid(cells, cells, cells * SPACING, cells * SPACING))
+    cloth = flat_cloth(*right_grid(cells, cells, size, size))
     inertia = energies.Inertia(cloth, 0.9 * bound)
     random = np.random.default_rng(5)
     inertia.x_hat = cloth.rest_positions + random.normal(0, 0.3 * SPACING, cloth.rest_positions.shape)

@@ -11,7 +11,6 @@ for `flat` and `point`, which are saddles on purpose.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable
 from functools import cache, partial
 from typing import Any
@@ -29,16 +28,16 @@ PINS = {"corners": (0, CELLS), "none": (), "side": tuple(range(CELLS + 1))}
 MARGIN = 4e-3  # [m] of the contact penalty
 DEADLINE = 60.0  # [s] for one step, after which its process is ended
 
-Start = Callable[[np.ndarray, np.random.Generator], np.ndarray]
+Start = Callable[[np.ndarray, np.random.Generator], np.ndarray]  # of positions (V, 3) [m]
 
 
 def perturbed(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """Return positions x (V, 3) [m] moved by a micrometre, enough to leave a saddle."""
+    """Return positions moved by a micrometre, enough to leave a saddle."""
     return x + random.normal(0, 1e-6, x.shape)
 
 
 def noisy(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """Return positions x (V, 3) [m] with noise of 2 mm."""
+    """Return positions with noise of 2 mm."""
     return x + random.normal(0, 2e-3, x.shape)
 
 
@@ -210,9 +209,7 @@ def sheet_step(
     random = np.random.default_rng(11)
     rest, faces = square_sheet(CELLS, SIZE)
     rest = REST_SHAPES[shape](rest)
-    material = dataclasses.replace(
-        sim.Material(), young_modulus=70e3 * stiffness, bending_stiffness=3.96e-5 * bending
-    )
+    material = sim.Material(young_modulus=70e3 * stiffness, bending_stiffness=3.96e-5 * bending)
     cloth = sim.Cloth(rest, faces, material, pins=PINS[pins])
     x = STARTS[start](rest.copy(), random)
     v = VELOCITIES[speed](x, rest) if isinstance(speed, str) else random.normal(0, 1.0, x.shape) * speed

@@ -1,7 +1,6 @@
 """Large bending with a known answer: elastica, catenary, lateral buckling, slit annulus.
 
-Elastica: a clamped strip against Euler's. Hinges stand for a plate stiffness D that depends on the mesh (see
-plates.py), so D, and where the clamp acts, are calibrated from small deflections (see clamped_strip.py).
+Elastica: a clamped strip against Euler's, calibrated from small deflections (see clamped_strip.py).
 
 Catenary, with lambda = 0: a string of force N = E2 s (s^2 - 1)/2 per width at stretch s, whose weight gives
 the force at each of its points; integrated by scipy.

@@ -19,13 +19,9 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import execute_plan as execution
 from benchmarks.runner.isolated_process import start_loading
 from reference_sim.files.atomic_files import disk_full
-from snug.networks.tensor_file import read_tensors, write_tensors
-from snug.training import checkpoint as checkpoints
-from snug.training.checkpoint import Checkpoint
+from snug.networks.tensor_file import write_tensors
 from tests.benchmarks.runner.tasks_by_hand import InProcess
 from tests.reference_sim.test_trajectory import wave
-from tests.snug.training.dressing import short
-from tests.snug.training.test_checkpoint import same_model
 
 
 @contextmanager
@@ -59,24 +55,6 @@ def test_a_file_that_finds_no_room_leaves_the_one_before_it(tmp_path, write):
     line = disk_full(full.value)
     assert line.startswith(f"{path}: File too large (") and "MB are free" in line
     assert disk_full(PermissionError(errno.EACCES, "no")) == disk_full(ValueError()) == ""
-
-
-def test_a_training_keeps_its_last_checkpoint(tmp_path, monkeypatch):
-    whole, path = short(steps=12), tmp_path / "run.safetensors"
-    write, saved = checkpoints.write_tensors, []
-
-    def second_is_too_large(place, tensors, header):
-        saved.append(header["done"])
-        with files_up_to(1 << 40 if len(saved) == 1 else 4000):
-            return write(place, tensors, header)
-
-    with monkeypatch.context() as patch:
-        patch.setattr(checkpoints, "write_tensors", second_is_too_large)
-        with pytest.raises(OSError, match="File too large") as full:
-            short(steps=12, checkpoint=Checkpoint(path=path, minutes=1e-9))
-    assert saved == [1, 2] and disk_full(full.value).startswith(f"{path}: ")
-    assert os.listdir(tmp_path) == ["run.safetensors"] and read_tensors(path)[1]["done"] == 1
-    same_model(short(steps=12, checkpoint=Checkpoint(path=path, minutes=0, resume=True)), whole)
 
 
 def test_a_run_stops_in_one_line_and_goes_on(tmp_path, monkeypatch, capsys):
