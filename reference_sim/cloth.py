@@ -18,18 +18,11 @@ class MeshError(ValueError):
 class Cloth:
     """Triangle mesh at rest with its material and pinned vertices.
 
-    Args:
-        rest_positions: (V, 3) [m]. The rest state of areas, masses, strain and hinges.
-        faces: (F, 3) vertex indices, consistently wound.
-        material: see `Material`.
-        pins: indices of vertices that never move by themselves.
-        rest_uv: (V, 2) [m], or (F, 3, 2) of the faces' corners, where a vertex on a seam has several:
-            optional flat rest state; it then replaces rest_positions for areas, masses, strain and hinges, so
-            that one rest state serves every term. rest_positions stays the starting shape.
+    The rest state of areas, masses, strain and hinges is rest_positions, or the flat rest_uv where it is
+    given; rest_positions then stays the starting shape.
 
-    Raises:
-        MeshError: wrong shapes, NaN, zero-area face, coincident or unused vertices, non-manifold edge,
-            inconsistent winding, pin out of range.
+    Raises MeshError that names the element: wrong shapes, NaN, zero-area face, coincident or unused
+    vertices, non-manifold edge, inconsistent winding, pin out of range.
 
     Example: a square of two triangles, held at one corner.
 
@@ -46,11 +39,11 @@ class Cloth:
         reference_sim.cloth.MeshError: face 0 = [0, 1, 1] names a vertex twice: remove it
     """
 
-    rest_positions: np.ndarray
-    faces: np.ndarray
+    rest_positions: np.ndarray  # (V, 3) [m]
+    faces: np.ndarray  # (F, 3) vertex indices, consistently wound
     material: Material = field(default_factory=Material)
-    pins: np.ndarray | tuple | list = ()
-    rest_uv: np.ndarray | None = None
+    pins: np.ndarray | tuple | list = ()  # vertices that never move by themselves
+    rest_uv: np.ndarray | None = None  # (V, 2) [m], or (F, 3, 2) of the faces' corners
 
     def __post_init__(self) -> None:
         # Copies: what is computed from them once must not change with the caller's arrays.
@@ -207,11 +200,7 @@ class Cloth:
 
 
 def check_mesh(positions: np.ndarray, faces: np.ndarray) -> None:
-    """Refuse shapes, indices and vertices that no cloth can have.
-
-    Raises:
-        MeshError: the message names the element.
-    """
+    """Raise MeshError for shapes, indices and vertices that no cloth can have."""
     if positions.ndim != 2 or positions.shape[1] != 3:
         raise MeshError(f"rest_positions has shape {positions.shape}: expected (V, 3)")
     if faces.ndim != 2 or faces.shape[1] != 3 or not np.issubdtype(faces.dtype, np.integer):

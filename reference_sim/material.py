@@ -14,18 +14,10 @@ GRAVITY = 9.81  # [m/s^2], downwards along -y
 class Material:
     """Isotropic fabric. Defaults are the cotton of the SNUG paper.
 
-    Args:
-        young_modulus: E [Pa].
-        poisson_ratio: nu [1], in (-1, 0.5].
-        thickness: t [m].
-        density: rho [kg/m^3].
-        bending_stiffness: k of the hinges [J], see BendHinge.
-
     The paper prints lambda = 20.9 and mu = 11.1 and multiplies them by a volume; the printed numbers are
     only consistent with E = 70 kPa, nu = 0.485 if they are membrane constants in N/m, thickness included.
 
-    Raises:
-        ValueError: a value is not finite or outside its physical range.
+    Raises ValueError for a value that is not finite or outside its physical range.
 
     Example:
         >>> from reference_sim import Material
@@ -37,11 +29,11 @@ class Material:
         ValueError: Material.thickness = 0.0: must be a finite number above 0 (SI units)
     """
 
-    young_modulus: float = 70e3
-    poisson_ratio: float = 0.485
-    thickness: float = 0.47e-3
-    density: float = 426.0
-    bending_stiffness: float = 3.96e-5
+    young_modulus: float = 70e3  # E [Pa]
+    poisson_ratio: float = 0.485  # nu [1], in (-1, 0.5]
+    thickness: float = 0.47e-3  # t [m]
+    density: float = 426.0  # rho [kg/m^3]
+    bending_stiffness: float = 3.96e-5  # k of the hinges [J], see BendHinge
 
     def __post_init__(self) -> None:
         for name in ("young_modulus", "thickness", "density"):
@@ -59,11 +51,7 @@ class Material:
     def from_file(cls, path: str | Path) -> Material:
         """Read the material of a .toml file: fields of this class, or all arguments of `from_lame`.
 
-        Fields that are left out keep their defaults.
-
-        Raises:
-            ValueError: no such file, not understood, an unknown or missing field, or a value out of its
-                range; the message names the file.
+        Fields that are left out keep their defaults. Raises ValueError that names the file.
         """
         try:
             values = tomllib.loads(Path(path).read_text(encoding="utf-8"))
@@ -87,20 +75,11 @@ class Material:
     ) -> Material:
         """Return the material from the numbers that SNUG's code and the methods after it give.
 
-        They are moduli in Pa; `lame_lambda` and `lame_mu` of a material are membrane constants in N/m, the
-        same times the thickness.
+        lame_lambda_pa and lame_mu_pa [Pa] are those of plane stress, 44,400 and 23,600 there; times the
+        thickness they are the membrane constants `lame_lambda` and `lame_mu` [N/m] of a material.
+        areal_density [kg/m^2] is 0.20022 there.
 
         nu = lambda / (lambda + 2 mu), E = 2 mu (1 + nu).
-
-        Args:
-            lame_lambda_pa: of plane stress, not yet times the thickness [Pa]: 44,400 there.
-            lame_mu_pa: likewise [Pa], 23,600 there.
-            thickness: [m], 0.47e-3 there.
-            areal_density: [kg/m^2], 0.20022 there.
-            bending_stiffness: k of scaled hinges [J], 3.96e-5 there.
-
-        Raises:
-            ValueError: a value is not finite or outside its physical range.
         """
         if not (thickness > 0 and lame_lambda_pa + 2 * lame_mu_pa > 0):
             raise ValueError("thickness and lambda + 2 mu must be above 0")

@@ -28,14 +28,9 @@ class HessianPattern:
     Cholesky factorisation reads it. Blocks are 3 x 3 for a Hessian, 1 x 1 for a scalar stiffness that the
     coordinates share.
 
-    Args:
-        free: (V,) True for vertices that take part.
-        block: 3 or 1.
-
     Attributes:
         free: (n,) indices of the free vertices, in the order of the matrix.
         indptr, indices: CSC structure of the (block n, block n) lower matrix.
-        order: fill-reducing order of its rows and columns.
         diagonal: places of the diagonal entries in the values.
     """
 
@@ -185,15 +180,9 @@ def _fill_rows(start, row, block, indices):
 
 
 class Potential:
-    """Sum of energies: value, gradient and sparse Hessian on a fixed pattern.
+    """Sum of energies of one cloth: value, gradient and sparse Hessian on a fixed pattern.
 
-    Leaving a term out of `energies` is an ablation; nothing of it is evaluated.
-
-    Args:
-        energies: the terms, all of one cloth.
-
-    Raises:
-        ValueError: no energies, energies of different cloths, or two of the same name.
+    Raises ValueError for no energies, energies of different cloths, or two of the same name.
 
     Example: the weight of a triangle pulls its corners down.
 
@@ -298,6 +287,7 @@ class Potential:
         """Return the pattern over the free vertices (V,): of the Hessian, or (block=1) scalar stiffness."""
         key = (np.packbits(free).tobytes(), block)
         if key not in self._patterns:
-            terms = [e for e in self.energies if block == 3 or e.has_scalar_stiffness]
+            undefined = Energy.scalar_stiffness
+            terms = [e for e in self.energies if block == 3 or type(e).scalar_stiffness is not undefined]
             self._patterns[key] = HessianPattern(terms, free, block=block)
         return self._patterns[key]

@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from reference_sim.obstacle import Obstacle
 
 FRAMES_ALONE = 60  # of a garment that meets nothing, or an obstacle that stands still
-TOP = 0.01  # share of the height, from the highest vertex down, that `top` pins
 EXAMPLES = """examples:
   python -m reference_sim.simulate sheet.obj --pins top --frames 90 -o sheet.vtkhdf
   python -m reference_sim.simulate shirt.obj --obstacle body.obj --obstacle-rest body.obj -o shirt.vtkhdf
@@ -62,12 +61,7 @@ def make_parser() -> argparse.ArgumentParser:
 
 @command("simulate")
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Read, simulate and write as the arguments say; return the exit status.
-
-    Raises:
-        ValueError: bad input, before anything is written; the message names file, element and remedy.
-        OSError: a file cannot be read or written.
-    """
+    """Read, simulate and write as the arguments say; return the exit status."""
     options = make_parser().parse_args(arguments)
     announce_compilation()
     path: Path = options.out
@@ -76,7 +70,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from reference_sim import energies
     from reference_sim.time_loop import simulate
 
-    cloth, obstacle = read_cloth(options), read_obstacle(options)
+    cloth, obstacle = read_cloth(options), read_obstacle(options) if options.obstacle else None
     terms = [energies.StretchStVK(cloth), energies.BendHinge(cloth), energies.Gravity(cloth)]
     if obstacle is not None:
         terms.append(energies.ContactPenalty(cloth))
@@ -109,33 +103,28 @@ def read_cloth(options: argparse.Namespace) -> Cloth:
 
 
 def choose_pins(which: str | None, positions: np.ndarray) -> list[int]:
-    """Return the vertices that `which` names among positions (V, 3) [m, y up]: "0,9,12", or "top"."""
+    """Return the vertices that `which` names among positions (V, 3) [m, y up]: "0,9", or "top" (1 %)."""
     if which is None:
         return []
     if which == "top":
         height = positions[:, 1]
-        top = height >= height.max() - TOP * (height.max() - height.min())
-        return [int(vertex) for vertex in top.nonzero()[0]]
+        return (height >= height.max() - 0.01 * (height.max() - height.min())).nonzero()[0].tolist()
     words = [word.strip() for word in which.split(",")]
     if not all(word.isdecimal() and int(word) < len(positions) for word in words):
         raise ValueError(f"--pins {which!r}: give 'top', or vertices from 0 to {len(positions) - 1} as '0,9'")
     return [int(word) for word in words]
 
 
-def read_obstacle(options: argparse.Namespace) -> Obstacle | None:
-    """Return the obstacle; None without one. Raises ValueError that names the file, and the remedy."""
-    if options.obstacle is None:
-        return None
+def read_obstacle(options: argparse.Namespace) -> Obstacle:
+    """Return the obstacle of its files. Raises ValueError that names the file, and the remedy."""
     from reference_sim.obstacle import Obstacle  # its search for contact serves no cloth that meets nothing
 
     positions, surface = read_sequence(options.obstacle)
     axes, rest = {"units": options.units, "up": options.up}, None
-    if options.obstacle_rest:
-        as_made = read_mesh(options.obstacle_rest)
+    if path := options.obstacle_rest:
+        as_made = read_mesh(path)
         if as_made.faces.tolist() != surface.faces.tolist():
-            raise ValueError(
-                f"{options.obstacle_rest}: other faces than {options.obstacle}: export both from one mesh"
-            )
+            raise ValueError(f"{path}: other faces than {options.obstacle}: export both from one mesh")
         rest = to_metres_y_up(as_made.positions, **axes)
     try:
         return Obstacle(to_metres_y_up(positions, **axes), surface.faces, rest_positions=rest)

@@ -29,9 +29,7 @@ if TYPE_CHECKING:
     from reference_sim.obstacle import Obstacle
 
 GUESSES = ("previous", "extrapolated", "body_transported")
-# First guess (V, 3) [m] of the end of a step, from its number, 1 for the first, and its start (V, 3) [m]. The
-# first step is asked for again where a start is checked.
-FirstGuess = Callable[[int, np.ndarray], np.ndarray]
+FirstGuess = Callable[[int, np.ndarray], np.ndarray]  # see `TimeStepper`
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,11 +46,9 @@ class TimeStepper:
     All that many runs of one scene can share is set up here; `start_again` stands between two of them.
 
     Args:
-        energies: the terms of Phi. Inertia is added here; no other term is.
-        dt: time between frames [s].
+        energies, dt, obstacle: as in `simulate`.
         substeps: backward-Euler steps per frame. Each is a minimisation; frame fields then hold sums of
             counts, the worst gradient norm, and the energies of the last sub-step.
-        obstacle: the moving body, one mesh per frame; terms of contact read it.
         guess: initial guess of a step: "previous", "extrapolated" (x + dt v), or "body_transported", moved
             along with the obstacle's nearest faces (default where there is an obstacle; else "extrapolated");
             or a function of the step's number, 1 for the first of a run, and its start (V, 3) [m] that
@@ -68,9 +64,8 @@ class TimeStepper:
             with x, as a barrier's do. Where such a term joins a step late (self-contact alone), the method is
             that of the minimisation without the term, by default "lbfgs", and Newton's method ends the step.
 
-    Raises:
-        ValueError: unknown guess, fewer than 1 sub-step, a time step or tolerance that is no number above 0,
-            a function as method beside a term that joins a step late, which Newton's method ends.
+    Raises ValueError for an unknown guess, fewer than 1 sub-step, a time step or tolerance not above 0, a
+    function as method beside a term that joins a step late, which Newton's method ends.
     """
 
     def __init__(
@@ -118,12 +113,8 @@ class TimeStepper:
     def advance(self, frame: int, state: State, pins: np.ndarray | None) -> tuple[State | None, list[Result]]:
         """Take the sub-steps to `frame`, with pins (P, 3) [m] at its end.
 
-        Returns:
-            The state at the frame, None if a sub-step diverged, and the result of each sub-step, and of each
-            time that it was solved again.
-
-        Raises:
-            ValueError: pins of another shape, or not finite.
+        Returns the state at the frame, None if a sub-step diverged, and the result of each sub-step, also
+        of each time that it was solved again.
         """
         x, v, results = state.x, state.v, []
         if pins is not None:
@@ -155,9 +146,6 @@ class TimeStepper:
         """Freeze every term for the step from x with velocity v (V, 3); return its first guess (V, 3) [m].
 
         handles: (P, 3) [m] where the pins are at the end of the step.
-
-        Raises:
-            ValueError: a function as guess gives another shape.
         """
         if callable(self.guess):
             first = np.array(self.guess(step, x.copy()), dtype=np.float64)
@@ -276,9 +264,7 @@ def simulate(
             method, tolerance, max_iterations, timeout, ...
 
     Returns:
-        A Trajectory whose status is "converged" if every frame converged, else the worst of the others:
-        "diverged", then "timeout", then "stalled" or "max_iterations"; the reason tells of the first frame
-        with it. A frame that is not finite ends the run. frame_fields: iterations, factorisations,
+        A Trajectory. A frame that is not finite ends the run. frame_fields: iterations, factorisations,
         gradient_norm (relative residual, see `Result`), converged (0/1), relaxed (1 where the residual is
         within the tolerance up to round-off alone; the reason tells of the first), energy/<term> [J].
 

@@ -28,16 +28,8 @@ class TrajectoryError(ValueError):
 class Trajectory:
     """Positions of one cloth over time.
 
-    Attributes:
-        positions: (T, V, 3) [m].
-        faces: (F, 3).
-        times: (T,) [s].
-        frame_seconds: (T,) time on the clock for each frame [s]; nan where none was taken, as by default.
-        status: "converged", or the worst failure among the frames ("diverged", then "timeout", then "stalled"
-            or "max_iterations"); "ok" for a method that does not minimise.
-        reason: one line in words, on the first frame with that status.
-        provenance: what made it (JSON values).
-        frame_fields: further numbers per frame, each (T,).
+    status: "converged", or the worst failure among the frames ("diverged", then "timeout", then "stalled"
+    or "max_iterations"), of which the reason tells the first; "ok" for a method that does not minimise.
 
     Example: two frames of a triangle, to a file and back.
 
@@ -55,14 +47,15 @@ class Trajectory:
         True
     """
 
-    positions: np.ndarray
-    faces: np.ndarray
-    times: np.ndarray
+    positions: np.ndarray  # (T, V, 3) [m]
+    faces: np.ndarray  # (F, 3)
+    times: np.ndarray  # (T,) [s]
+    # (T,) time on the clock for each frame [s]; nan where none was taken, as by default
     frame_seconds: np.ndarray = field(default_factory=lambda: np.empty(0))
     status: str = "ok"
     reason: str = ""
-    provenance: dict[str, Any] = field(default_factory=dict)
-    frame_fields: dict[str, np.ndarray] = field(default_factory=dict)
+    provenance: dict[str, Any] = field(default_factory=dict)  # what made it (JSON values)
+    frame_fields: dict[str, np.ndarray] = field(default_factory=dict)  # further numbers, each (T,)
 
     def __post_init__(self) -> None:
         if not len(self.frame_seconds):

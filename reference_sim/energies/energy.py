@@ -26,18 +26,14 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Step:
-    """State before one backward-Euler step, as a term may read it; all of it is frozen during the step.
+    """State before one backward-Euler step, as a term may read it, frozen during the step."""
 
-    previous: (V, 3) positions [m] and velocity: (V, 3) [m/s] at the start, guess: (V, 3) initial guess of the
-    end [m], dt [s], obstacle and its frame at the end of the step.
-    """
-
-    previous: np.ndarray
-    velocity: np.ndarray
-    guess: np.ndarray
-    dt: float
+    previous: np.ndarray  # (V, 3) [m] at the start
+    velocity: np.ndarray  # (V, 3) [m/s] at the start
+    guess: np.ndarray  # (V, 3) [m], initial guess of the end
+    dt: float  # [s]
     obstacle: Obstacle | None = None
-    frame: int = 0
+    frame: int = 0  # of the obstacle at the end of the step
 
 
 # What follows from the definition of a term, unless its class has a closed form.
@@ -83,11 +79,7 @@ class Energy:
     kernels: ClassVar[Mapping[str, Callable[[Any], Any]]] = {}
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Refuse a class with a definition of its own that would inherit the closed forms of another.
-
-        Raises:
-            TypeError: names the derivatives, and what to write where the definition is to give them.
-        """
+        """Raise TypeError for a definition of its own that would inherit the closed forms of another."""
         super().__init_subclass__(**options)
         own = vars(cls)
         if {"element_energy", "power"}.isdisjoint(own):
@@ -156,14 +148,10 @@ class Energy:
         return torch.stack([(zero if r is None else r).flatten(-2) for r in rows], dim=1).numpy()
 
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Return the elements with a non-zero Hessian (n,) and their blocks (n, 3k, 3k) [N/m].
+        """Return elements (n,) with a Hessian at x (V, 3) [m] and their blocks (n, 3k, 3k) [N/m].
 
-        Args:
-            x: (V, 3) [m].
-            convexity: share of the negative curvature that is taken out: 0 gives the true second derivatives,
-                1 positive semi-definite blocks.
-
-        Here by automatic differentiation and eigenvalues. The solver asks `add_hessian`.
+        convexity: share of the negative curvature that is taken out: 0 gives the true second derivatives,
+        1 positive semi-definite blocks. Here by automatic differentiation and eigenvalues.
         """
         blocks = self.hessian_blocks(x)
         if convexity > 0:
@@ -173,10 +161,9 @@ class Energy:
         return np.arange(len(self.stencils)), blocks
 
     def add_hessian(self, x: np.ndarray, convexity: float, places: BlockPlaces, data: np.ndarray) -> None:
-        """Add the second derivatives at x (V, 3) [m] to the values `data` of a matrix.
+        """Add the second derivatives at x (V, 3) [m] to the values `data` of a matrix, for the solver.
 
-        By default they are the blocks of active_hessian_blocks. A term with a closed form stores no blocks,
-        and takes out its negative curvature where it sits.
+        A term with a closed form stores no blocks, and takes out its negative curvature where it sits.
         """
         places.add(*self.active_hessian_blocks(x, convexity), data)
 
@@ -222,8 +209,3 @@ class Energy:
         without one are left out of a preconditioner.
         """
         raise NotImplementedError
-
-    @property
-    def has_scalar_stiffness(self) -> bool:
-        """True if the term defines `scalar_stiffness`."""
-        return type(self).scalar_stiffness is not Energy.scalar_stiffness

@@ -36,17 +36,13 @@ Contents = tuple[Any, Sequence[Any], Any, Sequence[Any]]
 
 @dataclass(frozen=True, eq=False)
 class Surface:
-    """Mesh of a file, in its own unit and axes.
+    """Mesh of a file, in its own unit and axes; quads are cut along the diagonal from their first corner.
 
-    Attributes:
-        positions: (V, 3).
-        faces: (F, 3) triangles; quads are cut in two along the diagonal from their first corner.
-        uv: (F, 3, 2) texture coordinates of the faces' corners, several for a vertex on a seam; NaN where a
-            corner has none, None where no corner has any.
+    uv (F, 3, 2): texture coordinates of the faces' corners; NaN for a corner without, None if all are.
     """
 
-    positions: np.ndarray
-    faces: np.ndarray
+    positions: np.ndarray  # (V, 3)
+    faces: np.ndarray  # (F, 3)
     uv: np.ndarray | None = None
 
 

@@ -60,26 +60,19 @@ def fast_kernel(term: Energy, use: str) -> Any:
 
 @dataclass(frozen=True)
 class StepTerms:
-    """The terms of a time step, for solvers that build in what belongs to single vertices.
+    """The terms of a time step, for solvers that build in what belongs to single vertices."""
 
-    Attributes:
-        inertia: the term that declares "vertex_inertia".
-        weighing: terms that declare "vertex_weights"; weights: (V,) [N] of all of them.
-        elements: all other terms, in the order of the potential; kernels: what each of them gives.
-    """
-
-    inertia: Inertia
-    weighing: tuple[Energy, ...]
-    weights: np.ndarray
-    elements: tuple[Energy, ...]
-    kernels: tuple[Any, ...]
+    inertia: Inertia  # declares "vertex_inertia"
+    weighing: tuple[Energy, ...]  # declare "vertex_weights"
+    weights: np.ndarray  # (V,) [N] of all of these
+    elements: tuple[Energy, ...]  # all other terms, in the order of the potential
+    kernels: tuple[Any, ...]  # of each element term
 
 
 def step_terms(potential: Potential, use: str, solver: str) -> StepTerms:
     """Return the terms of the potential with their kernels for this use.
 
-    Raises:
-        ValueError: a term without a kernel for `solver`, or no inertia.
+    Raises ValueError for a term without a kernel for `solver`, or no inertia.
     """
     for term in terms_without_kernel(potential, use):
         raise ValueError(

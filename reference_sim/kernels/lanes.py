@@ -88,16 +88,14 @@ def add_blocks(u, row, n, e, corners, slots, base, stride, data):
 class BlockPlaces:
     """Places of the blocks of elements with k corners in an array of values.
 
-    Attributes:
-        slots: (N, k k) number of each element's block of corners a, b at a k + b; -1 where it is not stored.
-        base, stride: by number; entry (i, j) of a block belongs at base + j stride + i.
-        size: of a block, 3 or 1.
+    slots (N, k k): number of each element's block of corners a, b at a k + b; -1 where it is not stored.
+    base, stride: by number; entry (i, j) of a block belongs at base + j stride + i.
     """
 
     slots: np.ndarray
     base: np.ndarray
     stride: np.ndarray
-    size: int
+    size: int  # of a block, 3 or 1
 
     def add(self, elements: np.ndarray, blocks: np.ndarray, data: np.ndarray) -> None:
         """Add the matrices (n, size k, size k) of some elements (n,)."""

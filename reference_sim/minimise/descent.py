@@ -106,34 +106,29 @@ class Result:
     """Outcome of one minimisation. Failure is a value here, not an exception.
 
     Attributes:
-        positions: (V, 3) [m], the best found.
         status: one of STATUSES. "converged" means: gradient within tolerance, no negative curvature beyond
             round-off left, of which a factorisation of the Hessian plus a tiny shift is the proof, and a
             negligible Newton step of that matrix. A longer step is accepted where the Hessian without the
             shift has no factorisation, as for cloth that may move rigidly: its length means nothing there.
-        reason: one line in words.
         relaxed: whether "converged" holds within round-off alone: the residual, or the round-off in it, is
             above the tolerance; the reason says which.
-        iterations, factorisations: counts.
         gradient_norm: the relative residual [1], by which every minimisation here is stopped: the largest
             component of dPhi/dx over the free vertices, divided by the mean weight of a vertex.
-        energy: value at positions [J].
-        terms: energy of each term [J].
     """
 
-    positions: np.ndarray
+    positions: np.ndarray  # (V, 3) [m], the best found
     status: str
-    reason: str
+    reason: str  # one line in words
     iterations: int
     factorisations: int
     gradient_norm: float
-    energy: float
-    terms: dict[str, float]
+    energy: float  # [J] at positions
+    terms: dict[str, float]  # [J] of each
     relaxed: bool = False
 
 
 def check_tolerance(tolerance: float) -> None:
-    """Raise ValueError for a tolerance that is no finite number above zero."""
+    """Raise ValueError for a tolerance that is no finite number above 0, as every minimiser does."""
     if not 0.0 < tolerance < float("inf"):
         raise ValueError(f"tolerance = {tolerance}: give a finite number above 0, in mean vertex weights")
 
@@ -145,14 +140,8 @@ STEP_HALVINGS = 24  # of a step before its direction is given up
 class Descent:
     """State of one minimisation over the free vertices of a cloth.
 
-    Args:
-        x: (V, 3) [m] start.
-        after: an earlier descent, whose counts and clock go on.
-
-    Attributes:
-        x: (V, 3), the point kept last; value [J] and g (3n,) [N] belong to it.
-        iterations, factorisations: counts.
-        started: clock [s] at the beginning.
+    x (V, 3) [m] is the start, then the point kept last; value [J] and g (3n,) [N] belong to it. after: an
+    earlier descent, whose counts and clock go on.
     """
 
     def __init__(self, potential: Potential, x: np.ndarray, *, after: Descent | None = None) -> None:
@@ -279,11 +268,8 @@ def approximate_wolfe(before: float, after: float, slope: float, end_slope: floa
 def iterate(solver: Any, run: Descent) -> Stop:
     """Minimise from where `run` is; return why that ended.
 
-    Args:
-        solver: with limits max_iterations and timeout [s], and two functions of the run that return a Stop
-            to end: terminate asks whether the point reached is an answer or no step can lead on from it, step
-            takes one.
-        run: what the minimisation changes.
+    solver: has limits max_iterations and timeout [s], and two functions of the run that return a Stop to
+    end: terminate asks whether the point is an answer or no step can lead on from it, step takes one.
     """
     if stop := run.begin():
         return stop

@@ -52,9 +52,6 @@ class LBFGS:
             it the result can only be "max_iterations", "stalled", "timeout" or "diverged": nothing but a look
             at the curvature can say "converged".
         timeout: seconds, for both together.
-
-    Raises:
-        ValueError: a tolerance that is no finite number above 0.
     """
 
     def __init__(

@@ -47,19 +47,13 @@ def make_minimiser(
 
 
 def minimise(potential: Potential, x0: np.ndarray, method: str = "newton", **options: Any) -> Result:
-    """Minimise `potential` from x0; pinned vertices stay where x0 has them.
+    """Minimise `potential` from x0 (V, 3) [m]; pinned vertices stay where x0 has them.
 
-    Args:
-        potential: the sum of energies.
-        x0: (V, 3) [m].
-        method: "newton" or "lbfgs".
-        options: of the method's class, `Newton` or `LBFGS`: tolerance, max_iterations, timeout, ...
+    method: "newton" or "lbfgs". options: of its class, `Newton` or `LBFGS`: tolerance, max_iterations,
+    timeout, ...
 
-    Returns:
-        The Result. Failure is a status in it, not an exception.
-
-    Raises:
-        ValueError: unknown method, or a tolerance that is no number above 0.
+    Failure is a status of the Result, not an exception. Raises ValueError for an unknown method, or a
+    tolerance that is no number above 0.
 
     Example: a sheet of two triangles hangs from one side.
 
@@ -88,18 +82,12 @@ LIMITS = ("tolerance", "max_iterations", "timeout")
 class StepMinimiser:
     """Minimiser of the potential of a step, from where the step starts and a first guess of its end.
 
-    Args:
-        potential: of the step, inertia included; frozen by its user before each step.
-        options: of the minimiser, see `simulate`.
+    The user of `potential`, inertia included, freezes it before each step. options: see `TimeStepper`.
 
     Attributes:
         options: as given, with the method by default: "newton" with a term whose pairs change, else "lbfgs",
             whose preconditioner knows nothing of pairs that come and go.
         opening_method: of the minimisation without the terms that join late; "" where none does.
-
-    Raises:
-        ValueError: a tolerance that is no number above 0, an unknown method, or a function as method beside a
-            term that joins late.
     """
 
     def __init__(self, potential: Potential, **options: Any) -> None:

@@ -62,9 +62,6 @@ class Newton:
         reuse: whether a factorisation serves further quasi-Newton steps, each of them an iteration.
         start_projected: whether the first iterations take all negative curvature out: one Hessian is then
             assembled where the search for the least projection assembles five.
-
-    Raises:
-        ValueError: a tolerance that is no finite number above 0.
     """
 
     def __init__(
