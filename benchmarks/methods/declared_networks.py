@@ -11,7 +11,7 @@ from typing import Any
 
 from benchmarks.method import MethodEntry, Reporting, Simulated, Training
 from snug.kinds import KINDS
-from snug.named_recipes import ABLATIONS, PAPER, PBNS_SPRINGS
+from snug.named_recipes import ABLATIONS, PAPER, PAPER_CONTACT, PBNS_SPRINGS
 
 TRAININGS = {
     **{
@@ -20,7 +20,7 @@ TRAININGS = {
     },
     "pbns-paper": Training("pbns", PAPER),
     "pbns-springs": Training("pbns", PBNS_SPRINGS),
-    **{f"snug-{recipe.name}": Training("snug", recipe) for recipe in (PAPER, *ABLATIONS)},
+    **{f"snug-{recipe.name}": Training("snug", recipe) for recipe in (PAPER, PAPER_CONTACT, *ABLATIONS)},
 }
 
 
@@ -86,6 +86,9 @@ NAMED = (
             seeded=False, role="baseline"),
     network("snug-paper", "SNUG, paper's text", "SNUG by the paper's text, its closest points remembered",
             base="snug", pairing_group="snug"),
+    network("snug-paper-contact", "SNUG, paper's text, simulator's contact",
+            "SNUG by the paper's text, but for the contact, which is that of the scene",
+            base="snug-paper", pairing_group="snug"),
     *(
         network(f"handles-{count}", "",
                 f"static network that moves the garment by {count} handles, trained on the energies",

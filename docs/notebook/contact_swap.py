@@ -13,35 +13,28 @@ numbers are those of training.md#the-swap-of-contact.
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import torch
-from recipe_contact import with_contact
 
 from benchmarks.assets import embedded_motions, open_assets
 from benchmarks.methods.networks import Network
+from benchmarks.methods.reference_variants import of_own_energies
 from benchmarks.methods.simulation import Simulation
 from benchmarks.metrics.energy import energy_series
 from benchmarks.presets import find_preset
 from benchmarks.scene import BuiltScene
 from benchmarks.scenes import GARMENT_SCENES
 from snug.motion.library import TRAIN
-from snug.named_recipes import PAPER
+from snug.named_recipes import PAPER, PAPER_CONTACT
 from snug.networks.dressed_body import DressedBody
 from snug.recipe import DEFAULT
 from snug.training.optimisation_step import Trainer
 from snug.training.train_network import TrainingLoop
 
 KEPT = (1000, 2000, 3000, 4000, 6000, 8000, 10_000, 12_000, 17_000, 22_000)  # steps
-CONTACT = ("contact_samples", "contact_stiffness", "contact_margin")
-RECIPES = {
-    "recipe's contact": PAPER,
-    "simulator's contact": replace(
-        PAPER, name="paper-simulator-contact", **{option: getattr(DEFAULT, option) for option in CONTACT}
-    ),
-}
+RECIPES = {"recipe's contact": PAPER, "simulator's contact": PAPER_CONTACT}
 TEST, TRAINING = ("07_02", "01_01_a", "02_07_a", "push_recovery"), ("07_01", "06_05")
 
 
@@ -85,7 +78,7 @@ def train(dressed: DressedBody, recipe, folder: Path) -> None:
 
 def compare(scene: BuiltScene, motion: str, folder: Path) -> None:
     """Print the excess of both simulations and of every set of weights, by both sets of energies."""
-    scenes = dict(zip(RECIPES, (with_contact(scene, PAPER), scene)))
+    scenes = dict(zip(RECIPES, (of_own_energies(scene, PAPER), scene)))
     path = folder / f"{motion}.npz"
     if not path.exists():
         found = [simulated(one) for one in scenes.values()]
