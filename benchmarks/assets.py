@@ -1,9 +1,4 @@
-"""Body, garments and motions of a run: a user's files, each read once, and what is made for the body.
-
-Digests are those of the contents as read. A clip of a motion, for suite speed, is the run of frames in which
-the joints are fastest on average, and the frames before it that are simulated and not evaluated. It begins in
-the midst of the motion, with the cloth as it is there: see benchmarks.scenes.dressed_body.
-"""
+"""Body, garments and motions of a run: a user's files, each read once, and what is made for the body."""
 
 from __future__ import annotations
 
@@ -51,14 +46,11 @@ class Read:
 
 @dataclass(frozen=True, eq=False)
 class Inputs:
-    """All that a run takes from a user's files; without any, the package's body and garments.
-
-    motions: name -> motion at its full length.
-    """
+    """All that a run takes from a user's files; without any, the package's body and garments."""
 
     body: Read | None = None
     garment: Read | None = None
-    motions: Mapping[str, Motion] = field(default_factory=dict)
+    motions: Mapping[str, Motion] = field(default_factory=dict)  # by name, at full length
 
     @cached_property
     def wearer(self) -> Body:
@@ -167,13 +159,9 @@ def open_assets(
     inputs: Inputs | None = None,
     training: Collection[str] = (),
 ) -> Assets:
-    """Tailor these garments and no others to the body, and cut motions to the preset's length.
+    """Tailor these garments to the body, but for the user's, and cut motions to the preset's lengths.
 
-    Motions are given at their full length; those named in `training` have another length. A garment is
-    that of a template, or the user's, which is taken as read.
-
-    Raises:
-        ValueError: a garment that cannot be tailored to this body.
+    Those named in `training` have another length. Raises ValueError for a garment that cannot be tailored.
 
     >>> assets = open_assets(find_preset("smoke"), embedded_motions(["walk"]), ["tshirt"])  # doctest: +SKIP
     """
@@ -208,7 +196,10 @@ def embedded_motions(names: Iterable[str]) -> list[Motion]:
 
 
 def liveliest_part(body: Body, motion: Motion, frames: int, warm_up: int = 0) -> range:
-    """Return the liveliest `frames` frames and `warm_up` before them; all of a motion too short."""
+    """Return the `frames` frames with the fastest joints on average, and `warm_up` before them.
+
+    Of a motion too short they are all.
+    """
     import numpy as np
 
     speed = joint_speeds(body, motion)

@@ -98,17 +98,13 @@ SOLVERS = (
         "refrozen", ", planes searched twice",
         ", each step solved again with contact planes searched at its end", "refrozen", refreeze=1,
     ),
-    # Newton: every iteration is a factorisation of the true Hessian, or several. A few iterations begin with
-    # all negative curvature taken out: moving cloth needs that in nearly every first one, and five Hessians
-    # would be assembled to find it out.
+    # All negative curvature is taken out at once: moving cloth needs that in nearly every first iteration.
     *_truncated(
         "newton", "Newton", "iteration", "Newton's method on the true Hessian, stopped after {} a step",
         (1, 2, 4, 8), method="newton", start_projected=True,
     ),
-    # L-BFGS: the preconditioner (mass over dt^2, a cotangent Laplacian, contacts) is factorised once a step;
-    # an iteration then costs one evaluation of the energies and three triangular solves. Without memory it is
-    # preconditioned gradient descent, in the manner of projective dynamics: one constant matrix, a line
-    # search, nothing learned from one iteration to the next.
+    # Without memory L-BFGS is preconditioned gradient descent, in the manner of projective dynamics: one
+    # constant matrix, a line search.
     *_truncated(
         "lbfgs", "L-BFGS", "iteration", "L-BFGS, factored preconditioner, stopped after {}",
         (5, 10, 20, 40), method="lbfgs", finish=False, memory=10,

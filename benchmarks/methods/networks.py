@@ -69,19 +69,20 @@ class CollisionPostProcessing:
 
 @dataclass
 class Network(Method):
-    """Network read from its file. Features are made and the network is warmed up before run().
+    """Network read from its file; without one skinning, smoothed as much as in the networks' default recipe.
 
-    cleanup: whether each frame is post-processed; the body is then posed before run() too.
+    Features and joint transforms are made and the network is warmed up before run(). cleanup: whether each
+    frame is post-processed; the body is then posed before run() too.
     """
 
-    path: Path
+    path: Path | None = None
     cleanup: bool = False
     clean: CollisionPostProcessing | None = field(default=None, init=False)
 
     def prepare(self, scene: BuiltScene) -> None:
         """Read the model, make the features and warm up. Not timed."""
         assert scene.dressed is not None
-        self.model = TrainedModel.load(self.path)
+        self.model = TrainedModel.load(self.path) if self.path else None
         self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
         self.dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
         if self.cleanup:
@@ -98,7 +99,7 @@ class Network(Method):
     def run(self) -> Trajectory:
         """Roll out all frames."""
         rolled = self.frames()
-        if not self.clean:
+        if not (self.clean and self.model):
             return rolled
         facts = {"method": f"{self.model.kind}+cleanup", "clean_up_margin_m": MARGIN}
         return replace(rolled, provenance=rolled.provenance | facts)
@@ -116,10 +117,16 @@ class Network(Method):
 
     def batch(self, copies: int) -> Callable[[], np.ndarray]:
         """Return a function that computes `copies` bodies in this motion at once, (T, copies, V, 3) [m]."""
+        assert self.model is not None
         return prepare_batch(self.model, self.dressed, self.motion, copies=copies)
 
     def quasi_static(self) -> Trajectory:
-        """Return the quasi-static solutions: each pose kept until nothing moves. Never on the clock."""
+        """Return the quasi-static solutions: each pose kept until nothing moves. Never on the clock.
+
+        Skinning has no dynamics: they are its roll-out.
+        """
+        if self.model is None:
+            return self.run()
         still = roll_out(self.model, self.dressed, self.motion, self.betas, quasi_static=True)
         if not self.clean:
             return still
@@ -132,32 +139,6 @@ def make_network(*, models: Path, seed: int, kind: str, cleanup: bool = False) -
     return Network(model_path(models, kind, seed), cleanup)
 
 
-class Skinning(Method):
-    """One linear blend a frame; joint transforms are ready before, as for the networks.
-
-    Weights are smoothed as much as those of the networks' default recipe: the rest is what a network adds.
-    """
-
-    def prepare(self, scene: BuiltScene) -> None:
-        """Smooth the weights and make the joint transforms. Not timed."""
-        assert scene.dressed is not None
-        self.motion, self.betas = scene.dressed.motion, scene.dressed.betas
-        self.dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
-        self.frames = prepare_roll_out(None, self.dressed, self.motion, self.betas)
-
-    def run(self) -> Trajectory:
-        """Skin all frames."""
-        return self.frames()
-
-    def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
-        """Return a function of the frame that makes joint transforms."""
-        return prepare_frame_inputs(None, self.dressed, self.motion, self.betas)
-
-    def quasi_static(self) -> Trajectory:
-        """Return the roll-out itself: skinning has no dynamics."""
-        return self.run()
-
-
-def make_skinning(*, models: Path, seed: int) -> Skinning:
-    """Make skinning alone; it has no seed and no model."""
-    return Skinning()
+def make_skinning(*, models: Path, seed: int) -> Network:
+    """Make skinning alone, without seed and model: what it lacks is what a network adds."""
+    return Network()

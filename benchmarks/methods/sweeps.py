@@ -1,15 +1,14 @@
 """Vertex block descent and XPBD: solvers that sweep over a mesh a given number of times.
 
-The kernels of the terms are arguments of a sweep (reference_sim.kernels.fast_kernels). One sweep of vertex
-block descent (Chen et al. 2024) visits the free vertices one after the other. Each takes a Newton step of its
-own three coordinates, all others held still:
+One sweep of vertex block descent (Chen et al. 2024) visits the free vertices one after the other. Each takes
+a Newton step of its own three coordinates, all others held still:
 
     x_i <- x_i - H_ii^-1 g_i,    g_i, H_ii: gradient and 3 x 3 block of the whole step's potential
 
 with H_ii made positive definite as in the simulator (compressive stress and the hinge's second derivative
-left out). So it minimises exactly the potential that Newton minimises, and a vertex at rest for all sweeps is
-a stationary point of it. On one core a sweep in the order of the mesh needs no colours. As in the paper there
-is no line search; its guess and its Chebyshev acceleration are left out: all solvers start alike here.
+left out), so its stationary points are Newton's. On one core a sweep in the order of the mesh needs no
+colours. As in the paper there is no line search; its guess and its Chebyshev acceleration are left out: all
+solvers start alike here.
 
 Extended position-based dynamics (Macklin et al. 2016) has constraints whose energies are ours, exactly.
 Each element is a constraint C(x) (a vector for the membrane) with energy C . K C / 2:
@@ -18,15 +17,14 @@ Each element is a constraint C(x) (a vector for the membrane) with energy C . K 
     bending     C = theta - theta_0,  K = k
     collision   C = depth^(3/2),      K = 2 k a_s
 
-so the sum over elements is StVK, hinges and the cubic penalty, to the last digit; the weight is in the
-predicted positions x_hat + dt^2 g, where a step starts. A sweep solves one constraint after the other:
+The weight is in the predicted positions x_hat + dt^2 g, where a step starts. A sweep solves one constraint
+after the other:
 
     (grad C M^-1 grad C^T + K^-1/dt^2) dlam = -C - K^-1/dt^2 lam,    x += M^-1 grad C^T dlam
 
-What it does not do is find the potential's minimum: the positions keep the gradients of C from where each
-dlam was found, and the second derivatives of C are left out. Its fixed point obeys lam = -dt^2 K C, but the
-momentum equation only as far as grad C did not turn on the way from the prediction. It minimises the
-potential where C is linear in x; elsewhere its limit for many sweeps is another configuration.
+It minimises the potential where C is linear in x. Elsewhere its limit for many sweeps is another
+configuration: it obeys lam = -dt^2 K C, but the momentum equation only as far as grad C did not turn on the
+way from the prediction.
 """
 
 from __future__ import annotations
@@ -129,10 +127,7 @@ def sweep_constraints(x, w, terms):
 
 
 class VertexBlockDescent(SweepSolver):
-    """Vertex block descent for one potential, in sweeps over all free vertices.
-
-    Raises ValueError for a term without a sweep, and without inertia.
-    """
+    """Vertex block descent. Raises ValueError for a term without a sweep, and without inertia."""
 
     def __init__(self, potential: Potential, *, max_iterations: int) -> None:
         super().__init__(potential, max_iterations=max_iterations)
@@ -172,10 +167,7 @@ def incidence(stencils: np.ndarray, used: np.ndarray, vertices: int) -> tuple[np
 
 
 class XPBD(SweepSolver):
-    """Extended position-based dynamics for one potential, of which it finds no minimum in general.
-
-    A sweep is over all constraints. Raises ValueError for a term without a sweep, and without inertia.
-    """
+    """Extended position-based dynamics. Raises ValueError for a term without a sweep, and without inertia."""
 
     def __init__(self, potential: Potential, *, max_iterations: int) -> None:
         super().__init__(potential, max_iterations=max_iterations)

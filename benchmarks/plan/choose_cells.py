@@ -26,16 +26,7 @@ PLACES = re.compile(r"\{(motion|swinging)(?: (\d+))?\}")
 
 @dataclass(frozen=True)
 class ReadStudy:
-    """A study whose files were read, with names in place of files.
-
-    Attributes:
-        study: what is asked.
-        inputs: body, garment and motions of the user.
-        motions: by their roles.
-        scenes: name -> every scene that could be asked for, of the project and of the user.
-        methods: likewise.
-        cases: known answers, likewise.
-    """
+    """A study with names in place of files, and all that it could ask for, of the project and of the user."""
 
     study: Study
     inputs: Inputs

@@ -30,15 +30,11 @@ EXAMPLES = """examples:
   python -m benchmarks.run --motions mocap.bvh,up=z --garment shirt.obj,units=cm --body mine.npz
   python -m benchmarks.run --scenes tshirt/kick --methods simulation,skinning --rollout mine=out.npz,ms=2.2
 
-a folder that holds a run is gone on with: what is finished there for the same inputs and code is taken
-  as it is, the rest is done. A run that was killed is so taken up again. --retry does again what failed,
-  --fresh everything.
+a folder that holds a run, also one that was killed, is gone on with: what is finished there for the same
+  inputs and code is taken as it is. --retry does again what failed, --fresh everything.
 
-exit status: 0 when every cell ended as ok or as an explained skip (in extremes a failure reported with
-  its reason is an accepted outcome); 1 when a cell, a training or a simulation failed: a line says why
-  and the rest went on; 2 when the study cannot be run, also where another run is going on in the
-  folder: one line says why and nothing is left behind; 130 when it was interrupted: what had ended is
-  in the folder, whole, and the same command goes on from there."""
+exit status: 0 every task ended well or was skipped with a reason; 1 one failed, a line says why, and the rest
+  went on; 2 the study cannot be run, one line says why; 130 interrupted, the same command goes on."""
 
 SHORT = {  # field -> its placeholder in help; those of a scene first
     "motions": "PATH", "test_motions": "NAME,...", "body": "FILE", "garment": "FILE",
