@@ -28,6 +28,10 @@ class Minimiser(Protocol):
         """Minimise from x0 (V, 3) [m]; pinned vertices stay where x0 has them."""
         ...
 
+    def start_again(self) -> None:
+        """Let the next run give the bits of a first one: forget what was learned from step to step."""
+        ...
+
 
 MINIMISERS: dict[str, Callable[..., Minimiser]] = {"newton": Newton, "lbfgs": LBFGS}
 
@@ -110,17 +114,10 @@ class StepMinimiser:
         self._minimiser = make_minimiser(potential, **self._ending)
 
     def start_again(self) -> None:
-        """Let the next run give the bits of a first one: minimisers forget what they have learned.
-
-        A minimiser without `start_again` is made anew.
-        """
+        """Let the next run give the bits of a first one: minimisers forget what they have learned."""
         self.__dict__.pop("_rough_minimiser", None)
-        if self._opening is not None and hasattr(self._opening, "start_again"):
-            self._opening.start_again()
-        if hasattr(self._minimiser, "start_again"):
-            self._minimiser.start_again()
-        else:
-            self._minimiser = make_minimiser(self.potential, **self._ending)
+        for minimiser in filter(None, (self._opening, self._minimiser)):
+            minimiser.start_again()
 
     def minimise(self, x: np.ndarray, guess: np.ndarray) -> Result:
         """Minimise the step that starts at x (V, 3) [m], from `guess` (V, 3) [m] or from as near as x comes.

@@ -16,7 +16,6 @@ from reference_sim.command_line import announce_compilation, command
         ("snug.train", ["--no-such-option"], "--no-such-option"),
         ("benchmarks.run", ["--body", ""], "--body '' names nothing: give a value"),  # of an unset variable
         ("benchmarks.run", ["--body="], "'--body=' names nothing"),
-        ("snug.check", ["shirt.obj", ""], "shirt.obj '' names nothing"),
     ],
 )
 def test_a_wrong_word_is_one_line_with_the_name_of_the_command(

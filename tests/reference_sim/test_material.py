@@ -33,10 +33,8 @@ def test_a_file_gives_its_fields_and_the_defaults_of_the_others(tmp_path):
     ("text", "message"),
     [
         (None, "no such file"),
-        ("young_modulus = ", "Invalid value"),
         ("youngs_modulus = 7e4", "unexpected keyword argument 'youngs_modulus'"),
         ("density = '426'", "give fields of Material"),
-        ("density = -1.0", "Material.density = -1.0: must be"),
         ("thickness = nan", "Material.thickness = nan: must be"),
         ("poisson_ratio = 0.51", "Material.poisson_ratio = 0.51: must lie"),
         ("bending_stiffness = -1e-9", "Material.bending_stiffness = -1e-09: must be"),

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import os
 import pickle
 import struct
@@ -28,8 +27,6 @@ ARRAYS = {
     "one": np.array(30.0),
     "big_endian": POSES.astype(">f4"),
     "word": np.array("female"),
-    "turned": POSES.T,
-    "letters": np.array([b"a", b"bc"]),
 }
 
 
@@ -46,34 +43,11 @@ def test_whole_files_are_read_as_they_were_written(tmp_path, save):
             np.testing.assert_array_equal(stored, array)
 
 
-np.savez(ARCHIVE := io.BytesIO(), poses=POSES)
-WHOLE = ARCHIVE.getvalue()
-
-
-@pytest.mark.parametrize(
-    ("data", "reason"),
-    [
-        (None, "no such file"),
-        (b"", "not a zip file"),
-        (WHOLE[:-30], "not a zip file"),
-        (WHOLE.replace(b"(4, 3)", b"(9, 9)"), "array 'poses': "),
-    ],
-)
-def test_an_archive_that_cannot_be_read_is_refused_in_one_line(tmp_path, data, reason):
-    path = tmp_path / "a.npz"
-    if data is not None:
-        path.write_bytes(data)
-    with pytest.raises(ArrayFileError, match=reason) as caught:
-        read_arrays(path)
-    assert str(path) in str(caught.value) and "\n" not in str(caught.value)
-
-
 ROLL_OUT = {
     "pred": np.arange(24, dtype=np.float32).reshape(2, 4, 3),
     "obstacle_faces": np.asfortranarray(np.array([[0, 1, 2]], dtype=np.uint32)),
     "metrics": defaultdict(list, time=[0.1, np.float64(0.2)]),
     "config": OrderedDict(name="höd", sizes=(1, None, True), tags={"a"}),
-    "turned": np.arange(24).reshape(2, 3, 4).transpose(1, 0, 2),
     "columns": scipy.sparse.csc_matrix(np.diag([1.0, 2.0, 3.0])[:2]),
     "fps": 30.0,
 }
@@ -119,14 +93,11 @@ def test_an_official_body_of_python_2_is_read(tmp_path):
     np.testing.assert_array_equal(read["J_regressor"], [[0, 1], [1, 0], [0, 0]])
 
 
-class Calls:
-    """Pickles as a call of that function."""
-
-    def __init__(self, function, *values):
-        self.call = function, values
+class Shell(str):
+    """Pickles as a call of os.system."""
 
     def __reduce__(self):
-        return self.call
+        return os.system, (str(self),)
 
 
 def name(text: str) -> bytes:
@@ -135,18 +106,16 @@ def name(text: str) -> bytes:
 
 def evil(marker: object) -> dict[str, bytes]:
     """Pickles that would make the file `marker` if what they name were called."""
-    shell, python = f"touch {marker}", f"open({str(marker)!r}, 'w')"
+    shell = f"touch {marker}"
     array = b"cnumpy.core.multiarray\n_reconstruct\ncnumpy\nndarray\nK\x00\x85C\x01b\x87R"
     call = name(shell) + b"\x85R."
     return {
-        "os.system": pickle.dumps(Calls(os.system, shell)),
-        "eval": pickle.dumps(Calls(eval, python)),
-        "obj": b"(cos\nsystem\nS'" + shell.encode() + b"'\no.",
+        "os.system": pickle.dumps(Shell(shell)),
+        "eval": b"c__builtin__\neval\n" + name(f"open({str(marker)!r}, 'w')") + b"\x85R.",
         "nested name": b"\x80\x04" + name("numpy") + name("ndarray.__class__") + b"\x93" + call,
         "reconstructor": b"ccopy_reg\n_reconstructor\n(cos\nsystem\nc__builtin__\nobject\nNtR.",
         "object array": b"\x80\x04" + array + b"(K\x01K\x01\x85cnumpy\ndtype\n" + name("O8")
         + b"\x89\x88\x87R\x89](cos\nsystem\netb.",
-        "pickle in a pickle": pickle.dumps(Calls(pickle.loads, pickle.dumps(Calls(os.system, shell)))),
         "slots of a class": b"\x80\x04cchumpy.ch\nCh\nN}(" + name("array") + b"cos\nsystem\nu\x86b.",
     }  # fmt: skip
 
@@ -155,7 +124,6 @@ ARRAY = pickle.dumps({"a": np.arange(6.0).reshape(2, 3)}, 4)
 BROKEN = {
     "cut off": ARRAY[:-40],
     "objects": pickle.dumps({"a": np.array([{}], dtype=object)}),
-    "fields": pickle.dumps({"a": np.zeros(2, dtype=[("a", "f4")])}),
     "no dict": pickle.dumps(np.arange(6.0)),
     "no array": pickle.dumps({"b": 1, "a": None}),
     "sparse rows": pickle.dumps({"a": scipy.sparse.csr_array(np.eye(2))}),

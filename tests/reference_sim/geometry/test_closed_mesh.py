@@ -10,8 +10,6 @@ from reference_sim.geometry.topology import check_closed
 from tests.reference_sim.meshes import box, sphere
 
 BALL, FACES = sphere(1)
-
-
 TURNED = np.where(np.arange(len(FACES))[:, None] == 3, FACES[:, ::-1], FACES)
 
 
@@ -24,12 +22,6 @@ def with_vertex(frame: int, vertex: int, place) -> np.ndarray:
 CUBE, CUBE_FACES = box((0, 0, 0), (1, 1, 1))
 NUMBER = np.array([6, 7, *range(8, 14)])  # of a second cube: its first edge is the last of the first
 CUBES = np.concatenate([CUBE, CUBE[2:] + np.array([1, 1, 0])])[None]
-
-
-def test_closed_surfaces_pass():
-    check_closed(np.stack([BALL, 2 * BALL]), FACES)
-    two = np.concatenate([BALL, BALL + np.array([5, 0, 0])])
-    check_closed(two[None], np.concatenate([FACES, FACES + len(BALL)]))
 
 
 @pytest.mark.parametrize(
