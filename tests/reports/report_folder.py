@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -159,6 +159,15 @@ def write_mesh(path: Path, positions: np.ndarray, faces: np.ndarray, fields: dic
 def mesh(positions: np.ndarray, faces: np.ndarray, fields: dict[str, np.ndarray]) -> Trajectory:
     times = np.arange(len(positions)) / 30.0
     return Trajectory(positions, faces, times, np.zeros(len(positions)), frame_fields=fields)
+
+
+def write_roll_outs(run: RunFolder, scenes: Iterable[str], methods: Iterable[str]) -> None:
+    """Sheets in the place of a body and of cloth, whose energies rise."""
+    fields = {f"energy/{term}": np.linspace(0, value, FRAMES) for term, value in TERMS.items()}
+    for scene in scenes:
+        write_mesh(run.trajectory_path(scene, "body"), *sheet(0.0), {})
+        for method in methods:
+            write_mesh(run.trajectory_path(scene, method), *sheet(0.1), fields)
 
 
 def sheet(height: float) -> tuple[np.ndarray, np.ndarray]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import itertools
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from reports.figures.plotting import draw_figures
 from reports.finished_run import read_run
 from reports.pdf import write_pdf
 from reports.tables import make_tables
-from tests.reports.report_folder import METHODS, SCENES, TERMS, all_rows, row, run_folder, sheet, write_mesh
+from tests.reports.report_folder import METHODS, SCENES, all_rows, row, run_folder, write_roll_outs
 
 pdfium = pytest.importorskip("pypdfium2", reason="the test extra is not installed")
 
@@ -24,50 +25,37 @@ LONG = "x" * 60 + "_with_a_name_as_long_as_a_run_lets_it_be"
 HOSTILE = ("#strong[markup] $x$ *b* _i_ @ref <b>&amp;", "quo\"ted 'name' `raw`", "裙子/夏天-βήτα", LONG)
 
 
-def many():
-    """More networks, stress tests and skips than there is room for."""
+def hostile_rows():
+    """More networks, stress tests and skips than there is room for, of which some have names of markup."""
     rows = all_rows()
-    for k in range(14):
-        for scene in SCENES:
-            for metric, unit in (("energy/total", "J"), ("curvature/error", "1/m"), ("cost/frame", "ms")):
-                rows.append(row(scene, f"network-{k}", metric, 1.0 + k, unit=unit))
-            rows.append(row(scene, f"network-{k}", "dynamics/amplitude", 1e-9 * k, unit="1"))
+    for k, scene in itertools.product(range(14), SCENES):
+        for metric, unit in (("energy/total", "J"), ("curvature/error", "1/m"), ("cost/frame", "ms")):
+            rows.append(row(scene, f"network-{k}", metric, 1.0 + k, unit=unit))
+        rows.append(row(scene, f"network-{k}", "dynamics/amplitude", 1e-9 * k, unit="1"))
     skips = {"value": None, "status": "skipped", "reason": "it moves a garment with a body's joints " * 3}
     rows += [row(f"sheet_{k}", f"network-{k}", suite="speed", garment="", **skips) for k in range(20)]
     outcome = {"suite": "extremes", "method": "simulation", "metric": "outcome", "unit": "vertex weights"}
-    rows += [
-        row(f"case_{k}", value=None, status="stalled", reason="collapsed " * 30, **outcome) for k in range(30)
-    ]
-    return rows
-
-
-def hostile():
-    renamed = {"snug": HOSTILE[0], "pbns": HOSTILE[3], "supervised": HOSTILE[2]}
-    scenes = {
-        SCENES[0]: f"tshirt/{HOSTILE[1]}",
-        "hanging_sheet": HOSTILE[2],
-        "stiff": LONG,
-        "teleport": LONG + "y",
-    }
+    stalled = {"value": None, "status": "stalled", "reason": "collapsed " * 30}
+    rows += [row(f"case_{k}", **stalled, **outcome) for k in range(30)]
+    methods = {"snug": HOSTILE[0], "pbns": LONG, "supervised": HOSTILE[2]}
+    scenes = {SCENES[0]: f"tshirt/{HOSTILE[1]}", "hanging_sheet": HOSTILE[2], "stiff": LONG}
     return [
         dataclasses.replace(
-            r, method=renamed.get(r.method, r.method), family=renamed.get(r.family, r.family),
+            r, method=methods.get(r.method, r.method), family=methods.get(r.family, r.family),
             scene=scenes.get(r.scene, r.scene), reason=r.reason and f"{r.reason}: {HOSTILE[0]} {LONG}",
         )
-        for r in all_rows()
+        for r in rows
     ]  # fmt: skip
 
 
-@pytest.fixture(scope="module", params=[many, hostile])
-def report(request, tmp_path_factory):
-    """The pages of a report; that of many methods has roll-outs."""
-    rows, provenance = request.param(), {"commit": "abc", "started": "2030-01-02T03:04:05+00:00"}
+@pytest.fixture(scope="module")
+def report(tmp_path_factory):
+    """The pages of a report with roll-outs."""
+    rows, provenance = hostile_rows(), {"commit": "abc", "started": "2030-01-02T03:04:05+00:00"}
     run = run_folder(tmp_path_factory.mktemp("run"), rows, preset="smoke", **provenance)
-    for scene in {r.scene for r in rows if r.garment} if request.param is many else ():
-        write_mesh(run.trajectory_path(scene, "body"), *sheet(0.0), {})
-        for method in {r.method for r in rows} & {*METHODS, *HOSTILE}:
-            fields = {f"energy/{t}": np.linspace(0, v, 5) for t, v in TERMS.items()}
-            write_mesh(run.trajectory_path(scene, method), *sheet(0.1), fields)
+    write_roll_outs(
+        run, {r.scene for r in rows if r.garment}, {r.method for r in rows} & {*METHODS, *HOSTILE}
+    )
     read = read_run(run)
     pictures = draw_figures(read, run.figures, FIGURES)
     write_pdf(run, Report(read, make_tables(read), pictures))
@@ -122,10 +110,8 @@ def test_pages_are_few_and_full(report):
         assert np.diff(inked).max() < len(image) / 3
 
 
-def test_names_stand_as_they_are(request, texts):
+def test_names_stand_as_they_are(texts):
     bare = "".join(word for page in texts for word, _ in page).replace("\u200b", "")  # where a line may break
     assert "裙" not in bare  # of no font: it would be an empty box
-    names = ["Simulation"]
-    if request.node.callspec.params["report"] is hostile:
-        names += [*HOSTILE[:2], LONG, "U+88D9U+5B50/U+590FU+5929-βήτα"]
+    names = ["Simulation", *HOSTILE[:2], LONG, "U+88D9U+5B50/U+590FU+5929-βήτα"]
     assert [name for name in names if "".join(name.split()) not in bare] == []

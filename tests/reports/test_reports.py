@@ -29,6 +29,7 @@ from tests.reports.report_folder import (
     run_of,
     sheet,
     write_mesh,
+    write_roll_outs,
 )
 
 OLD = ("energy_series_flag.svg", "failures_tunic.svg")
@@ -40,13 +41,7 @@ def made(tmp_path_factory) -> RunFolder:
     """A whole run folder with its report, drawn without OpenGL, where figures of an earlier report lay."""
     metadata = {"preset": "smoke", "commit": "abc", "finished": "2030-01-02T03:04:05+00:00"}
     run = run_folder(tmp_path_factory.mktemp("run"), all_rows(), **metadata)
-    for scene in SCENES:
-        body, faces = sheet(0.0)
-        write_mesh(run.trajectory_path(scene, "body"), body, faces, {})
-        for method in METHODS:
-            cloth, faces = sheet(0.1)
-            fields = {f"energy/{t}": np.linspace(0, v, FRAMES) for t, v in TERMS.items()}
-            write_mesh(run.trajectory_path(scene, method), cloth, faces, fields)
+    write_roll_outs(run, SCENES, METHODS)
     energies = [
         f"{scene},{m},0,{k / 30},{0.1 * k},0.1" for scene in SCENES for m in METHODS for k in range(3)
     ]

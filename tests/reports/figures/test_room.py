@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from dataclasses import replace
 
-import numpy as np
-import pandas as pd
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.legend import Legend
@@ -15,71 +12,22 @@ from matplotlib.transforms import Bbox
 
 from reports.blocks import FIGURES
 from reports.figures.plotting import PAGE_WIDTH, Drawing
-from reports.finished_run import Run
-from tests.reports.report_folder import row, run_of
+from reports.statistics.outcomes import PUBLISHED, read_published
 
 LEAST = 4.0  # [cm] that a panel is wide and high on paper
 PRINTED = 17.0 / 2.54 / PAGE_WIDTH  # inches on paper of an inch of a figure as wide as the page
 LETTERS = 1.0  # [points] by which boxes of texts may overlap: letters do not fill them
-ROLES = {
-    "simulation": "reference", "skinning": "baseline", "nearest-poses": "baseline",
-    "pose-regression": "baseline", **dict.fromkeys(
-        ("snug", "supervised", "pbns", "ncs", "handles-20", "handles-40", "handles-80", "snug+cleanup",
-         "snug-springs", "tailornet", "santesteban2019"), "network"),
-}  # fmt: skip
-LABELS = {
-    "skinning": "Skinning alone", "nearest-poses": "Nearest poses",
-    "pose-regression": "Ridge on principal components", "ncs": "Neural Cloth Simulation, static branch",
-    "snug+cleanup": "SNUG, post-processed", "snug-springs": "SNUG, springs in place of the membrane",
-    "tailornet": "TailorNet, a network for each frequency",
-}  # fmt: skip
-SCENES = ("tshirt/01_01_a", "tshirt/push_recovery", "tshirt/sit_and_stand", "tshirt/cartwheel_lean")
-FRAMES = 40
-
-
-def rows_of_all():
-    """Rows of every suite that a figure shows."""
-    rows, rng = [], np.random.default_rng(0)
-    for scene, (place, (method, role)) in itertools.product(SCENES, enumerate(ROLES.items())):
-        more = {"role": role, "family": "handles" if "handles" in method else method, "seeded": False}
-        more |= {"level": float(method[-2:])} if "handles" in method else {}
-        spread = 10.0 ** rng.uniform(-1.0, 1.0)
-        values = {
-            "energy/total": 1.0 + place, "energy/strain": 0.1 + place, "penetration/vertices": 0.1 * place,
-            "curvature/error": 4.0 * spread, "cost/frame": 0.1 * 1.5**place if place else 100.0,
-            "gap/energy": 0.1 * spread, "step/distance": 3.0 * spread, "distance/rms": 10.0 * spread,
-            "cost/train": 300.0 + place, "cost/data": 0.0,
-        }  # fmt: skip
-        for suite in ("garments", "speed"):
-            rows += [row(scene, method, name, x, suite=suite, **more) for name, x in values.items()]
-    for scene, k in itertools.product(SCENES, range(1, 9)):
-        more = {"suite": "speed", "role": "solver", "family": "newton", "level": k}
-        for name, x in {"cost/frame": 9.0 * k, "gap/energy": 0.3 / k**3, "curvature/error": 5.0 / k}.items():
-            rows.append(row(scene, f"newton-{k}", name, x, **more))
-    return rows
 
 
 @pytest.fixture(scope="module")
-def run() -> Run:
-    labels = {name: {"label": LABELS.get(name, name.replace("-", " ").capitalize())} for name in ROLES}
-    run = run_of(rows_of_all(), methods=labels)
-    lines = [
-        (SCENES[0], method, 0, k / 30, *(0.01 * (2 + place + np.sin(k / 5 + place)) for _ in range(3)))
-        for place, method in enumerate(ROLES)
-        for k in range(FRAMES)
-    ]
-    columns = ["scene", "method", "seed", "seconds", "strain", "bending", "inertia"]
-    energies = pd.DataFrame(lines, columns=columns)
-    return replace(run, frame_energies=energies)
-
-
-@pytest.fixture(scope="module")
-def drawings(run) -> list[Drawing]:
+def drawings() -> list[Drawing]:
+    """The figures of the published run of 26 methods."""
+    run = read_published(PUBLISHED / "ablations")
     return [drawing for figure in FIGURES for drawing in figure.drawings(run)]
 
 
-def test_panels_of_fifteen_methods_are_at_least_four_centimetres_wide_and_high(drawings):
-    assert len(ROLES) == 15 and len(drawings) == 2
+def test_panels_of_many_methods_are_at_least_four_centimetres_wide_and_high(drawings):
+    assert len(drawings) == 2
     for drawing in drawings:
         FigureCanvasAgg(drawing.canvas).draw()
         scale = 2.54 * min(PRINTED, 17.0 / 2.54 / drawing.canvas.get_figwidth()) / drawing.canvas.dpi
