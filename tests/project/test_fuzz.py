@@ -32,7 +32,6 @@ from snug.body.smpl_files import read_body
 from snug.file_options import GarmentFile
 from snug.garments.garment import GarmentError
 from snug.garments.reading import read_garment
-from snug.garments.templates import find_template
 from snug.motion.files import load_motions
 from snug.motion.motion import MotionError
 from snug.networks.garment_network import make_network
@@ -41,6 +40,7 @@ from snug.recipe import DEFAULT
 from tests.snug.body.other_bodies import smpl_arrays
 from tests.snug.motion.cmu_clips import amc_frame, cmu_like
 from tests.snug.motion.motion_forms import bvh
+from tests.snug.training.dressing import tailored
 
 NUMBERS = (b"-1", b"0", b"1e300", b"nan", b"inf", b"99999999999999999999", b"9" * 5000, b"1000000000", b"")
 
@@ -98,7 +98,7 @@ def model() -> TrainedModel:
 
 
 def write_shirt(path: Path) -> None:
-    made = find_template("tshirt").tailor(Body.load(), vertices=200)
+    made = tailored("tshirt", 200)
     write_obj(path, made.rest_positions, made.faces)
 
 

@@ -14,9 +14,7 @@ from benchmarks.provenance import digest_of_file
 from benchmarks.results.run_folder import FORMAT, RunFolder
 from reports import build
 from reports.figures.plotting import kept_picture
-from reports.finished_run import make_run, read_run
-from reports.statistics.means_and_spreads import Mean
-from reports.tables import make_tables
+from reports.finished_run import read_run
 from tests.reports.report_folder import (
     FRAMES,
     METHODS,
@@ -152,16 +150,6 @@ def test_page_one_names_the_files_that_are_not_as_the_run_wrote_them(tmp_path):
     assert read_run(run).warnings == []
     run.write_rows(all_rows()[:-1])
     assert read_run(run).warnings == ["Not as the run wrote them: results.csv"]
-
-
-def test_a_metric_nobody_heard_of_makes_its_own_table(tmp_path):
-    rows = [*all_rows(), row(SCENES[0], "snug", "sound/volume", 60.0, unit="dB")]
-    config = declaration(rows)
-    config["metrics"]["sound/volume"] |= {"table": "acoustics", "title": "Volume"}
-    tables = make_tables(make_run(config, rows))
-    assert tables["acoustics"].rows == (("tshirt", "snug", Mean(60.0, None, 1, 1)),)
-    tables["acoustics"].write_csv(tmp_path)
-    assert read_csv(tmp_path / "acoustics.csv")[0]["sound/volume [dB]"] == "60"
 
 
 def test_times_of_several_machines_are_named():

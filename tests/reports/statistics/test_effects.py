@@ -45,29 +45,35 @@ def t_interval(value, error, freedom):
     return value + stats.t.ppf((0.025, 0.975), freedom) * error
 
 
-def test_of_one_motion_the_interval_is_welchs_over_seeds():
-    """Numbers that are not all positive: sqrt(s1^2/n1 + s2^2/n2) and its degrees of freedom by hand."""
-    one, other = ONE - 1.2, np.array((0.9, 1.5, 1.0, 1.1)) - 0.7
-    parts = [values.var(ddof=1) / len(values) for values in (one, other)]
-    freedom = sum(parts) ** 2 / sum(part**2 / (len(v) - 1) for part, v in zip(parts, (one, other)))
-    comparison = effect(mean_over(one), mean_over(other, "pbns"))
-    assert (
-        comparison.scale == DIFFERENCE
-        and comparison.covers == "seeds"
-        and comparison.shown == one.mean() - other.mean()
-    )
+def welch(*samples):
+    """Standard error of the difference of two means, and its degrees of freedom, by hand."""
+    parts = [values.var(ddof=1) / len(values) for values in samples]
+    shares = (part**2 / (len(values) - 1) for part, values in zip(parts, samples))
+    return math.sqrt(sum(parts)), sum(parts) ** 2 / sum(shares)
+
+
+BELOW, FOUR = ONE - 1.2, np.array((0.9, 1.5, 1.0, 1.1)) - 0.7  # not all are positive
+# Motions are drawn for both at once, so what one of them asks of both is no scatter.
+TALL, APART = np.array([[0.1], [5.0], [-3.0], [9.0]]), np.array([[0.1], [0.2], [0.2], [0.1]])
+
+
+@pytest.mark.parametrize(
+    ("one", "method", "other", "covers", "error", "freedom"),
+    [
+        (BELOW, "pbns", FOUR, "seeds", *welch(BELOW, FOUR)),
+        (TALL, "pbns", TALL - APART, "motions", APART.std(ddof=1) / 2.0, 3.0),
+        # A method without seeds has no scatter; one run of a seeded method is one more draw of the scatter.
+        (BELOW, "simulation", [[-0.4]], "seeds", BELOW.std(ddof=1) * math.sqrt(1 / 3), 2.0),
+        (BELOW, "pbns", [[-0.4]], "seeds", BELOW.std(ddof=1) * math.sqrt(4 / 3), 2.0),
+    ],
+    ids=["seeds of both", "motions", "no seeds", "one seed"],
+)
+def test_the_interval_is_students_over_what_was_repeated(one, method, other, covers, error, freedom):
+    comparison = effect(mean_over(one), mean_over(other, method))
+    assert comparison.scale == DIFFERENCE and comparison.covers == covers
+    assert comparison.shown == pytest.approx(np.mean(one) - np.mean(other))
     assert comparison.freedom == pytest.approx(freedom, rel=3 * NOISE)
-    low, high = t_interval(comparison.shown, math.sqrt(sum(parts)), comparison.freedom)
-    assert comparison.interval == pytest.approx((low, high), abs=NOISE * (high - low))
-
-
-def test_of_one_seed_the_interval_is_of_pairs_of_motions():
-    """Motions are drawn for both at once, so what one of them asks of both is no scatter."""
-    one, other = np.array([[0.1], [5.0], [-3.0], [9.0]]), np.array([[0.0], [4.8], [-3.2], [8.9]])
-    apart = (one - other).ravel()
-    comparison = effect(mean_over(one), mean_over(other, "pbns"))
-    low, high = t_interval(apart.mean(), apart.std(ddof=1) / 2.0, 3)
-    assert comparison.covers == "motions" and comparison.freedom == pytest.approx(3.0)
+    low, high = t_interval(comparison.shown, error, comparison.freedom)
     assert comparison.interval == pytest.approx((low, high), abs=NOISE * (high - low))
 
 
@@ -83,15 +89,6 @@ def test_seeds_of_a_pairing_group_are_drawn_at_once_and_others_by_themselves():
     rows = [row(method="snug-no-inertia", value=LESS[k], seed=k) for k in (2, 0, 1)]
     turned = mean_of(run_of(rows).frame, "snug-no-inertia", "energy/strain")
     assert effect(turned, mean_over(ONE)) == alike  # by their number, not their order
-
-
-@pytest.mark.parametrize(("method", "freed"), [("simulation", 1 / 3), ("pbns", 1 + 1 / 3)])
-def test_one_number_beside_several_seeds(method, freed):
-    """A method without seeds has no scatter; one run of a seeded method is one more draw of the scatter."""
-    comparison = effect(mean_over([[-0.4]], method), mean_over(ONE - 1.2))
-    half = stats.t.ppf(0.975, 2) * ONE.std(ddof=1) * math.sqrt(freed)
-    assert comparison.interval[1] - comparison.interval[0] == pytest.approx(2.0 * half, rel=NOISE)
-    assert comparison.freedom == pytest.approx(2.0)
 
 
 def random_means(random, motions, seeds, spread, paired):
@@ -220,23 +217,13 @@ def test_shares_of_excess_are_compared_by_logarithm_above_one_percent_and_by_dif
     assert on_scale(0.02, EXCESS) - on_scale(0.01, EXCESS) == pytest.approx(0.01, rel=1e-3)
     motions = np.array([[2.0], [4.0], [8.0], [16.0]])
     comparison = effect(mean_over(motions), mean_over(0.0 * motions, "simulation"), EXCESS)
-    assert (
-        comparison.shown == pytest.approx(np.sinh(np.arcsinh(motions).mean()))
-        and comparison.shown < motions.mean()
-    )
-    low, high = comparison.interval
-    error = np.arcsinh(motions).std(ddof=1) / 2.0
-    ends = np.sinh(t_interval(np.arcsinh(motions).mean(), error, 3))
-    assert (low, high) == pytest.approx(tuple(ends), rel=3 * NOISE)
+    logs = np.arcsinh(motions)
+    assert comparison.shown == pytest.approx(np.sinh(logs.mean())) and comparison.shown < motions.mean()
+    ends = np.sinh(t_interval(logs.mean(), logs.std(ddof=1) / 2.0, 3))
+    assert comparison.interval == pytest.approx(tuple(ends), rel=3 * NOISE)
     less = effect(mean_over(0.5 * motions), mean_over(motions, "pbns"), EXCESS)
-    assert (
-        less.shown == pytest.approx(0.5 * comparison.shown - comparison.shown, rel=0.1)
-        and less.interval[1] < 0.0
-    )
-
-
-def test_points_between_two_shares_are_the_same_in_either_order():
-    motions = np.array([[2.0], [4.0], [8.0], [16.0]])
+    assert less.shown == pytest.approx(-0.5 * comparison.shown, rel=0.1) and less.interval[1] < 0.0
+    # Points between two shares are the same in either order.
     large = motions * np.array([[90.0], [150.0], [70.0], [120.0]])
     difference = effect(mean_over(motions), mean_over(large, "pbns"), EXCESS)
     back = effect(mean_over(large), mean_over(motions, "pbns"), EXCESS)

@@ -18,18 +18,17 @@ from snug.body.skeleton import JOINT
 from snug.file_options import GarmentFile, parse_garment_file
 from snug.garments.garment import GarmentError
 from snug.garments.reading import read_garment
-from snug.garments.templates import find_template
 from snug.networks.dressed_body import DressedBody
 from tests.snug.garments.garment_files import doubled_along, own_chart, saved, z_up
-from tests.snug.training.dressing import tube_dress
+from tests.snug.training.dressing import tailored, tube_dress
 
 
-@pytest.fixture(scope="session")
-def shirt(body):
-    return find_template("tshirt").tailor(body, vertices=300)
+@pytest.fixture
+def shirt():
+    return tailored("tshirt", 300)
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture
 def tube():
     """150 vertices, made in milliseconds."""
     return tube_dress().garment
@@ -99,7 +98,7 @@ def test_doubled_vertices_are_joined(tmp_path, body, tube):
 
 
 def test_a_skirt_is_held_by_its_waist_and_follows_neither_leg(tmp_path, body):
-    skirt = find_template("skirt").tailor(body, vertices=300)
+    skirt = tailored("skirt", 300)
     read = read_garment(GarmentFile(path=saved(tmp_path, skirt)), body)
     assert set(read.loops) == {"waist", "hem"}
     np.testing.assert_array_equal(read.pins, skirt.pins)

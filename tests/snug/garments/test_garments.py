@@ -7,41 +7,28 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from snug.body.parametric_body import Body
 from snug.body.skeleton import JOINT
 from snug.garments.cuts import neck_cut
 from snug.garments.garment import GarmentError
 from snug.garments.templates import GARMENT_TEMPLATES, find_template
 from tests.reference_sim.meshes import edge_counts, girth
 from tests.snug.body.other_bodies import child, other_mesh
+from tests.snug.training.dressing import tailored
 
 KINDS = [pattern.name for pattern in GARMENT_TEMPLATES]
+SIZES = [pytest.param(("tshirt", vertices), marks=pytest.mark.slow) for vertices in (300, 4400)]
 
 
-class Wardrobe(dict):
-    """Every sort of garment, at 600 vertices, tailored when it is asked for."""
-
-    def __missing__(self, kind):
-        self[kind] = find_template(kind).tailor(Body.load(), vertices=600)
-        return self[kind]
-
-
-@pytest.fixture(scope="session")
-def wardrobe():
-    return Wardrobe()
-
-
-@pytest.fixture(params=[*KINDS, *(pytest.param(size, marks=pytest.mark.slow) for size in (300, 4400))])
-def garment(request, wardrobe, body):
+@pytest.fixture(params=[*((kind, 600) for kind in KINDS), *SIZES])
+def garment(request):
     """Every sort, the T-shirt of other sizes too."""
-    size = request.param
-    return wardrobe[size] if size in KINDS else find_template("tshirt").tailor(body, vertices=size)
+    return tailored(*request.param)
 
 
 @pytest.fixture(params=["tshirt", "tunic"])
-def shirt(request, wardrobe):
+def shirt(request):
     """With sleeves, each vertex with the weights of one body vertex."""
-    return wardrobe[request.param]
+    return tailored(request.param, 600)
 
 
 def at(body, name):
@@ -168,8 +155,9 @@ def test_a_measure_out_of_range_or_of_another_kind_is_named(body, wrong, says):
     assert "\n" not in str(caught.value)
 
 
-def test_legs_are_as_long_as_asked_and_each_follows_its_own(body, wardrobe):
-    points = {name: wardrobe[name].rest_positions for name in ("shorts", "trousers")}
+def test_legs_are_as_long_as_asked_and_each_follows_its_own(body):
+    wardrobe = {name: tailored(name, 600) for name in ("shorts", "trousers")}
+    points = {name: garment.rest_positions for name, garment in wardrobe.items()}
     heights = {name: points[name][wardrobe[name].loops["left_leg"], 1] for name in points}
     ankle = at(body, "left_ankle")[1]
     # Two equations for the crotch, from which both inseams are measured.
@@ -186,9 +174,9 @@ def test_legs_are_as_long_as_asked_and_each_follows_its_own(body, wardrobe):
         assert weights[:, foreign].max() < 0.2 and np.allclose(weights.sum(axis=1), 1.0)
 
 
-def test_arms_are_bare_or_covered_to_the_wrist(body, wardrobe):
+def test_arms_are_bare_or_covered_to_the_wrist(body):
     shoulder, wrist = at(body, "left_shoulder")[0], at(body, "left_wrist")[0]
-    long, top = wardrobe["long_sleeves"], wardrobe["tank_top"]
+    long, top = tailored("long_sleeves", 600), tailored("tank_top", 600)
     cuff = shoulder + long.parameters["sleeve"] * (wrist - shoulder)
     assert long.rest_positions[:, 0].max() == pytest.approx(cuff, abs=1e-4)
     assert JOINT["left_elbow"] in np.argmax(long.skinning_weights, axis=1)
@@ -196,8 +184,8 @@ def test_arms_are_bare_or_covered_to_the_wrist(body, wardrobe):
     assert np.ptp(armhole[:, 1]) > 0.12 and armhole[:, 0].max() < shoulder + 0.1
 
 
-def test_a_dress_follows_both_thighs_below_and_the_skin_above(body, wardrobe):
-    dress = wardrobe["dress"]
+def test_a_dress_follows_both_thighs_below_and_the_skin_above(body):
+    dress = tailored("dress", 600)
     body_weights = body.skinning_weights[dress.body_vertices]
     y, hip = dress.rest_positions[:, 1], at(body, "left_hip")[1]
     assert np.array_equal(dress.skinning_weights[y > hip + 0.05], body_weights[y > hip + 0.05])
@@ -210,15 +198,15 @@ def test_a_dress_follows_both_thighs_below_and_the_skin_above(body, wardrobe):
     assert np.allclose(dress.skinning_weights.sum(axis=1), 1.0, atol=1e-12)
 
 
-@pytest.mark.parametrize("kind", ["tank_top", "trousers"])
-def test_every_kind_of_cut_fits_another_mesh(body, kind):
-    garment = find_template(kind).tailor(other_mesh(body, 5000), vertices=500)
-    assert set(garment.loops) == OPENINGS[kind]
+CUTS = ("tank_top", "trousers")  # of each kind of cut one
+ON_OTHERS = [
+    pytest.param(kind, other, marks=[] if kind in CUTS and other is other_mesh else pytest.mark.slow)
+    for kind in KINDS
+    for other in (other_mesh, child)
+]
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", KINDS)
-@pytest.mark.parametrize("other", [other_mesh, child])
+@pytest.mark.parametrize(("kind", "other"), ON_OTHERS)
 def test_every_kind_fits_another_body_and_can_be_simulated(body, kind, other):
     garment = find_template(kind).tailor(other(body), vertices=500)
     assert set(garment.loops) == OPENINGS[kind] and len(garment.cloth().masses) == len(garment.rest_positions)

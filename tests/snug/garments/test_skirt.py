@@ -13,7 +13,6 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.ground_truth import simulate_quasi_static
 from reference_sim import Trajectory
 from snug.body.skeleton import JOINT
-from snug.garments.templates import find_template
 from snug.motion.library import make_motion
 from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import roll_out
@@ -21,14 +20,14 @@ from snug.networks.trained_model import TrainedModel
 from snug.training.train_network import untrained_model
 from tests.benchmarks.runner.tasks_by_hand import context, dressed_scene
 from tests.reference_sim.meshes import girth
-from tests.snug.training.dressing import short
+from tests.snug.training.dressing import short, tailored
 
 TINY = dataclasses.replace(find_preset("smoke"), garment_vertices=300, frames=10, clip_frames=8)
 
 
-@pytest.fixture(scope="module")
-def skirt(body):
-    return find_template("skirt").tailor(body, vertices=600)
+@pytest.fixture
+def skirt():
+    return tailored("skirt", 600)
 
 
 @pytest.fixture(scope="module")

@@ -11,6 +11,7 @@ import torch
 from snug.body.parametric_body import Body
 from snug.garments.garment import Garment
 from snug.garments.meshing import nearest_body_vertices
+from snug.garments.templates import find_template
 from snug.kinds import KINDS
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
@@ -49,6 +50,12 @@ def tube_dress() -> DressedBody:
     nearest = nearest_body_vertices(body, positions)
     weights = np.asarray(body.skinning_weights)[nearest]
     return DressedBody(body, Garment("tube", positions, faces, nearest, weights))
+
+
+@cache
+def tailored(kind: str, vertices: int) -> Garment:
+    """A garment of a template on the package's body, tailored once."""
+    return find_template(kind).tailor(Body.load(), vertices=vertices)
 
 
 def swaying(frames: int = 24, *, name: str = "sway", degrees: float = 25.0, fps: float = 30.0) -> Motion:
