@@ -128,18 +128,7 @@ class StoredRollOut:
 
 
 def read_roll_out(path: str | Path) -> StoredRollOut:
-    """Read a file, a folder or a pattern of files.
-
-    Raises:
-        RollOutFileError: one line with the file, for whatever is wrong.
-
-    >>> import tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     still, faces = np.zeros((5, 3, 3)), np.array([[0, 1, 2]])
-    ...     np.savez(f"{folder}/mine.npz", positions=still, faces=faces, fps=30.0)
-    ...     read_roll_out(f"{folder}/mine.npz").positions.shape
-    (5, 3, 3)
-    """
+    """Read a file, a folder or a pattern of files. Raises RollOutFileError, one line with the file."""
     path = str(path)
     suffix = Path(path).suffix.lower()
     suffixes = (*_READERS, *MESH_SUFFIXES)

@@ -10,15 +10,12 @@ boundary vertex the formula means nothing, so those are left out.
 
 The paper reports a "mean curvature error" without a definition. Ours, at each frame, is
     sum_i A_i | H_i - H_i^ref | / sum_i A_i      over interior vertices, A_i of the reference,
-averaged over frames. The difference of the two area-weighted means is given beside it: it is blind
-to where the wrinkles are, as vertex-by-vertex errors are not.
+averaged over frames. The difference of the two means is given beside it: it is blind to places.
 
 Whether wrinkles stay the same while the body moves ("the same despite the significant change in body
 pose", the paper says of PBNS) is told by
     sum_ti A_i | H_ti - median_t H_ti | / sum_ti A_i | H_ti - mean H |      with A_i the mean over frames,
-the part of all spread of curvature that is in time: 0 where each vertex keeps its own, at most 1. It does
-not depend on how deep wrinkles are. It does not tell why they change: skinning alone gives the part that
-the joints make of wrinkles that stay, a simulation has swing and history too, and a flicker counts as well.
+however deep the wrinkles are. It does not tell why they change: a flicker counts as well.
 """
 
 from __future__ import annotations
@@ -75,12 +72,7 @@ def series_of(roll_out: RollOut) -> CurvatureSeries:
 
 
 def boundary_mask(faces: Faces, vertices: int) -> NDArray[np.bool_]:
-    """Return a mask (V,), True on vertices of edges with one triangle and on vertices of none.
-
-    >>> import numpy as np
-    >>> boundary_mask(np.array([[0, 1, 2]]), 4)
-    array([ True,  True,  True,  True])
-    """
+    """Return a mask (V,), True on vertices of edges with one triangle and on vertices of none."""
     edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     unique, counts = np.unique(edges, axis=0, return_counts=True)
     mask = np.ones(vertices, dtype=bool)
@@ -94,9 +86,6 @@ def mean_curvature(x: Vertices, faces: Faces) -> tuple[Floats, Floats]:
 
     Values at boundary vertices are returned as computed; mask them with `boundary_mask`. A vertex of zero
     area gets curvature 0 and, as its area is 0, weighs nothing in any mean.
-
-    Source:
-        Meyer, Desbrun, Schröder and Barr 2003; the formula stands at the top of this module.
 
     >>> from benchmarks.meshes import icosphere
     >>> round(float(mean_curvature(*icosphere(3, 0.25))[0].mean()), 3)
@@ -176,11 +165,7 @@ def curvature_change(series: CurvatureSeries) -> float | None:
 
 
 def histogram_distance(series: CurvatureSeries, reference: CurvatureSeries) -> Floats:
-    """Return the Wasserstein-1 distance of the distributions of H in each frame, (T,) [1/m].
-
-    The area between the two cumulated distributions: how much wrinkling there is, wherever it sits. Each side
-    is weighted by its own areas.
-    """
+    """Return the Wasserstein-1 distance of the distributions of H by area in each frame, (T,) [1/m]."""
     pairs = zip(series.curvature, series.area, reference.curvature, reference.area)
     return np.array([_wasserstein(*pair) for pair in pairs])
 

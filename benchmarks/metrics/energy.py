@@ -85,13 +85,6 @@ def energy_series(scene: BuiltScene, trajectories: Sequence[Positions]) -> list[
     """Return energies of each trajectory: term of the scene -> (T,) [J], plus "total".
 
     Frames are the outer loop: what belongs to a frame alone, as an obstacle's search tree, is made once.
-
-    >>> from benchmarks.presets import find_preset
-    >>> from benchmarks.scenes import find_scene
-    >>> scene = find_scene("hanging_sheet").at(find_preset("smoke")).build()
-    >>> still = scene.cloth.rest_positions[None].repeat(3, axis=0)
-    >>> {term: abs(round(float(series[2]), 9)) for term, series in energy_series(scene, [still])[0].items()}
-    {'strain': 0.0, 'bending': 0.0, 'gravity': 0.0, 'inertia': 0.0, 'total': 0.0}
     """
     copies = [copied_terms(scene) for _ in trajectories]
     tables = [{name: np.zeros(len(positions)) for name in scene.terms} for positions in trajectories]

@@ -1,9 +1,9 @@
 """Metrics intersections/*: a cloth through itself, in a frame and between two frames.
 
-A frame without intersections may follow another one though a layer went through the other between them. On
-the straight way of every vertex from one frame to the next a vertex meets a triangle, or an edge an edge,
-where the four points are in one plane and their primitives touch (Provot 1997). Broad phase and test are
-those of the package ipctk, by tight inclusion (Wang, Ferguson, Schneider, Jiang, Attene and Panozzo 2021).
+A layer may go through another between two frames without intersections. On the straight way of every
+vertex from one frame to the next a vertex meets a triangle, or an edge an edge, where the four points are
+in one plane and their primitives touch (Provot 1997). Broad phase and test are those of the package
+ipctk, by tight inclusion (Wang, Ferguson, Schneider, Jiang, Attene and Panozzo 2021).
 """
 
 from __future__ import annotations

@@ -20,13 +20,7 @@ if TYPE_CHECKING:
 
 
 def self_intersections(x: Vertices, faces: Faces) -> tuple[NDArray[np.bool_], float]:
-    """Return which faces intersect another, (F,), and the contours' length [m].
-
-    >>> import numpy as np
-    >>> flat, upright = [[0, 0, 0], [4, 0, 0], [0, 4, 0]], [[1, 1, -1], [1, 1, 1], [9, 1, 0]]
-    >>> self_intersections(np.array(flat + upright, dtype=float), np.array([[0, 1, 2], [3, 4, 5]]))[1]
-    2.0
-    """
+    """Return which faces intersect another, (F,), and the contours' length [m]."""
     corners = x[faces]
     low, high = corners.min(1), corners.max(1)
     order = np.argsort(low[:, 0], kind="stable")

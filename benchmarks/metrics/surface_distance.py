@@ -6,9 +6,8 @@ normals there, both weighted by a third of the triangles around the vertex,
     Chamfer distance   (mean of d from A to B + mean of d from B to A) / 2                        [mm]
     angle of normals   the same of theta                                                          [degrees]
 
-(Cignoni, Rocchini and Scopigno 1998 for distances from samples to a surface, taken both ways.) They are blind
-to cloth that slides along itself. What moves on another mesh than the scene's has these numbers and its
-penetration alone: energies, curvature errors and distances are of the same vertices.
+(Cignoni, Rocchini and Scopigno 1998). They are blind to cloth that slides along itself. What moves on another
+mesh than the scene's has these numbers and its penetration alone.
 """
 
 from __future__ import annotations
@@ -47,14 +46,7 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
 
 
 def chamfer_and_angle(x: Vertices, faces: Faces, y: Vertices, others: Faces) -> tuple[float, float]:
-    """Return Chamfer distance [m] and mean angle of normals [rad] between two surfaces.
-
-    >>> from benchmarks.meshes import icosphere
-    >>> inner, outer = icosphere(3, 1.0), icosphere(4, 1.2)
-    >>> distance, angle = chamfer_and_angle(*inner, *outer)
-    >>> round(distance, 2), round(angle, 2)
-    (0.2, 0.0)
-    """
+    """Return Chamfer distance [m] and mean angle of normals [rad] between two surfaces."""
     forth, back = _one_way(x, faces, y, others), _one_way(y, others, x, faces)
     return (forth[0] + back[0]) / 2.0, (forth[1] + back[1]) / 2.0
 

@@ -1,7 +1,4 @@
-"""Known answers of contact: a sheet on a plane, a point that leaves a sphere, a strip over a cylinder.
-
-The round bodies are exact, not meshes of triangles: they answer what an `Obstacle` answers.
-"""
+"""Known answers of contact: a sheet on a plane, a point that leaves a sphere, a strip over a cylinder."""
 
 from __future__ import annotations
 
@@ -76,7 +73,7 @@ PULL = 2.0  # [N/m] at its ends, about, so that it never hangs slack
 
 
 class RoundBody:
-    """Sphere about the origin, or (axis=2) cylinder about the z axis, of `radius` [m]; its skin is exact.
+    """Sphere about the origin, or (axis=2) cylinder about the z axis, of `radius` [m]; an exact `Obstacle`.
 
     Its centre is at `heights` (T,) [m], frame by frame. It turns about z by `turn` [rad] a frame: its face
     has the turned unit vectors as corners, so that "barycentric" coordinates on it are the coordinates of a

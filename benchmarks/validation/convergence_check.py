@@ -32,10 +32,7 @@ def solve_and_check(potential: sim.Potential, guess: np.ndarray) -> Measurement:
 
 
 def check_result(potential: sim.Potential, guess: np.ndarray, result: sim.Result) -> Measurement:
-    """Check the solver's claim against independent numbers.
-
-    The value of the row is the relative residual, computed independently.
-    """
+    """Check the solver's claim; the value of the row is the relative residual, computed independently."""
     measured = partial(Measurement, terms="+".join(energy.name for energy in potential.energies))
     status, x = STATUS.get(result.status, result.status), result.positions
     if not np.isfinite(x).all():

@@ -43,10 +43,7 @@ def free_fall() -> float:
     unit="m", expected=0.0, tolerance=1e-9, reason="round-off of the times at which the pins are asked for"
 )
 def moving_pins_in_substeps() -> float:
-    """Return the distance of a sheet pulled by its pins, four steps a frame, to that of a quarter of dt.
-
-    Between frames pins move straight on.
-    """
+    """Return the distance of a sheet pulled by its pins, four steps a frame, to that of a quarter of dt."""
     from benchmarks.scenes import sheets
 
     scene, steps, frames = sheets.build_hanging_sheet(HANGING, sheet_cells=6, sheet_frames=10), 4, 10

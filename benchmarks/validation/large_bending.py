@@ -1,7 +1,5 @@
 """Large bending with a known answer: elastica, catenary, lateral buckling, slit annulus.
 
-Elastica: a clamped strip against Euler's, calibrated from small deflections (see clamped_strip.py).
-
 Catenary, with lambda = 0: a string of force N = E2 s (s^2 - 1)/2 per width at stretch s, whose weight gives
 the force at each of its points; integrated by scipy.
 
@@ -11,9 +9,8 @@ at the other end (Michell 1899, Prandtl 1899), or 12.85 (EI GJ)^0.5 / L^2 spread
 2021. Of a narrow strip of width b on equilateral triangles EI = D (1 - nu^2) b and GJ = 2 D (1 - nu) b.
 
 Slit annular plate (Sze, Liu and Lo 2004): clamped at one lip of the slit, the other lifted by a line load.
-Equilateral triangles are mapped to the annulus by exp, which is conformal. Such a plate has nu = -1/3, so its
-D is C11 = k/4, and the energy of Gaussian curvature makes it one of nu = 0; without that term the limit is
-another plate, which the load lifts less.
+Equilateral triangles are mapped to the annulus by exp, which is conformal. Such a plate has nu = -1/3, and
+the energy of Gaussian curvature makes it one of nu = 0; without that term the load lifts it less.
 """
 
 from __future__ import annotations

@@ -68,12 +68,7 @@ UNIAXIAL = np.diag([STRETCH, np.sqrt(1 - NARROWED * (STRETCH**2 - 1))])  # the l
     expected=1.0, tolerance=1e-12, reason="round-off of some hundred triangles",
 )  # fmt: skip
 def closed_form(state: str) -> float:
-    """Return the energy of a homogeneous state of a rotated, unstructured patch over its closed form.
-
-    With G = (s^2 - 1)/2, per unit area: uniaxial strain (lam/2 + mu) G^2; uniaxial stress E2 G^2/2 at
-    lateral stretch^2 1 - nu2 (s^2 - 1); equibiaxial 2 (lam + mu) G^2; simple shear g
-    lam g^4/8 + mu (g^2/2 + g^4/4); collapse to a point (lam + mu)/2.
-    """
+    """Return the energy of a homogeneous state of a rotated, unstructured patch over its closed form."""
     cloth, points = _turned_patch()
     lam, mu = COTTON.lame_lambda, COTTON.lame_mu
     s, g, G = STRETCH, SHEAR, (STRETCH**2 - 1) / 2

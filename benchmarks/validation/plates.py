@@ -34,7 +34,6 @@ from reference_sim import energies
 from reference_sim.geometry.topology import boundary_loops, corner_angles
 
 if TYPE_CHECKING:
-    import scipy.sparse as sp
     from torch import Tensor
 
 COLUMNS, ROWS, CELL, DEPTH = 6, 4, 0.1, 0.7
@@ -166,19 +165,14 @@ def _bent(family: str, cells: int, height: float, curvature: np.ndarray, terms: 
 
     size = np.array([cells, cells * height])
     points, faces = rectangle(family, cells, cells, *size)
-    cloth, K = _stiffness(points, faces, terms)
+    cloth = flat_cloth(points, faces, sim.Material(bending_stiffness=STIFFNESS))
+    # Out of the plane, (V,V).
+    K = sim.Potential(list(terms(cloth))).hessian(cloth.rest_positions).tocsr()[2::3][:, 2::3]
     ring = ((points < 1.01) | (points > size - 1.01)).any(axis=1)
     w = 0.5 * np.einsum("vi,ij,vj->v", points, curvature, points)
     inside = np.flatnonzero(~ring)
     w[inside] = spla.spsolve(K[inside][:, inside], -(K[inside][:, ring] @ w[ring]))
     return 0.5 * float(w @ (K @ w)) / STIFFNESS, float(cloth.hinge_areas.sum() / 3)
-
-
-def _stiffness(points: np.ndarray, faces: np.ndarray, terms: Terms) -> tuple[sim.Cloth, sp.csr_matrix]:
-    """Return the cloth of a flat mesh (V,2) and the Hessian (V,V) of its terms out of the plane."""
-    cloth = flat_cloth(points, faces, sim.Material(bending_stiffness=STIFFNESS))
-    hessian = sim.Potential(list(terms(cloth))).hessian(cloth.rest_positions).tocsr()
-    return cloth, hessian[2::3][:, 2::3]
 
 
 class GaussianCurvature(energies.Energy):
