@@ -7,11 +7,10 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks.methods import METHODS, find_method
+from benchmarks.methods import find_method
 from benchmarks.metrics import curvature, dynamics, energy
 from benchmarks.metrics import penetration_and_distances as geometry
 from benchmarks.metrics.dynamics import HemMotion
-from benchmarks.results.protocol import MEMBERS, is_member
 from benchmarks.results.row import Row
 from benchmarks.runner.measurements import compared, measured
 from benchmarks.runner.rows import with_uncertainty
@@ -43,12 +42,6 @@ def test_the_uncertainty_of_a_distance_is_what_another_right_simulation_changes(
     assert compared(group.roll_outs[0], geometry.compare) == {}
     alone = grouped(scene, {"simulation": x, "newton-1": x + 0.01 * EAST})
     assert compared(alone.roll_outs[1], geometry.compare)["distance/rms"] == pytest.approx(10.0)
-
-
-def test_the_ensemble_is_fixed_and_untimed():
-    reporting = {entry.name: entry.reporting for entry in METHODS if entry.role == "reference-variant"}
-    members = {name for name, said in reporting.items() if is_member(said.family, said.level)}
-    assert members == set(MEMBERS) == set(TWINS) and not any(find_method(name).timed for name in members)
 
 
 def test_a_start_is_moved_by_its_shift_and_in_no_two_runs_alike():
