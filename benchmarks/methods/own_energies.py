@@ -67,13 +67,13 @@ def own_reference(entry: MethodEntry) -> MethodEntry | None:
     own = own_energies(entry)
     if own in (None, DEFAULT, STATIC) or is_own_reference(entry):
         return None
-    named = (name for name, training in TRAININGS.items() if energies_of(training) == own)
-    name = next(named, entry.trained)
+    recipes = (training.recipe for training in TRAININGS.values() if energies_of(training) == own)
+    name = next((recipe.name for recipe in recipes), f"of-{entry.trained}")
     static = "inertia" not in own.terms
     return MethodEntry(
-        name=f"simulation-{name}",
-        label=f"Simulation, energies of {name}",
-        description=f"the {'quasi-static solution' if static else 'reference'} with the energies of {name}",
+        name=f"simulation-{name}" + "-at-rest" * static,
+        label=f"Simulation, {name.replace('-', ' ').replace('pbns', 'PBNS')}" + ", at rest" * static,
+        description=f"{'quasi-static solutions' if static else 'the reference'} with the energies of {name}",
         module=MODULE,
         options={option: getattr(own, option) for option in OPTIONS},
         needs_body=True,

@@ -105,7 +105,7 @@ SPRINGS = "Figure 3: springs deform less expressively than StVK; here, networks 
 MATERIAL = "Figure 3, with all of PBNS's material, springs and unscaled hinges"
 SIMULATED = {
     "springs": f"{SPRINGS.partition(';')[0]}; here, simulated",
-    "pbns-springs": f"{MATERIAL}; simulated",
+    "pbns-springs-at-rest": f"{MATERIAL}; simulated",
 }
 LONGER = "Section 3.5: longer windows in training also minimise the inertia"
 DYNAMICS = (

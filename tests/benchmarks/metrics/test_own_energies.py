@@ -83,15 +83,15 @@ def test_simulations_have_the_constants_that_are_trained_on(scene):
         method.prepare(scene)
         return {term.name: term for term in method.scene.energies}
 
-    contact = terms("snug-paper")["collision"]
+    contact = terms("paper")["collision"]
     assert (contact.margin, contact.samples) == (0.002, "vertices")
     assert contact.stiffness.sum() == pytest.approx(1.34e6 * scene.cloth.areas.sum())
-    hinges = terms("snug-printed-bending")["bending"]
+    hinges = terms("printed-bending")["bending"]
     assert (hinges.stiffness == scene.cloth.material.bending_stiffness).all()
-    pbns = terms("pbns-springs")
+    pbns = terms("pbns-springs-at-rest")
     assert pbns["spring"].stiffness == 15.0 and (pbns["bending"].stiffness == 1e-4).all()
     assert (pbns["collision"].power, pbns["collision"].margin) == (2, 4e-3)
-    assert set(terms("snug-no-gravity")) == {"strain", "bending", "collision"}
+    assert set(terms("no-gravity")) == {"strain", "bending", "collision"}
 
 
 @pytest.mark.parametrize("name", ["supervised", "snug-no-strain", "snug-no-collision"])
@@ -117,7 +117,7 @@ def test_the_simulation_joins_where_the_network_meets_the_reference():
         cells = planned("smoke", "--scenes", "tshirt/01_01_a", "--methods", ",".join(names)).cells
         return [cell.method for cell in cells]
 
-    assert methods("simulation", "snug-paper") == ["simulation", "snug-paper", "simulation-snug-paper"]
+    assert methods("simulation", "snug-paper") == ["simulation", "snug-paper", "simulation-paper"]
     assert methods("snug-paper") == ["snug-paper"]
     assert methods("simulation", "snug") == ["simulation", "snug"]
 
@@ -128,5 +128,5 @@ def test_a_users_training_has_a_simulation_of_its_own_energies():
         find_method("snug"), name="soft", trained="soft", training=Training("snug", soft)
     )
     reference = own_reference(entry)
-    assert reference.name == "simulation-soft" and reference.options["contact_margin"] == 0.001
+    assert reference.name == "simulation-of-soft" and reference.options["contact_margin"] == 0.001
     assert own_energies(reference) == own_energies(entry) != DEFAULT
