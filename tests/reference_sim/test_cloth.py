@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from reference_sim import Cloth, Material, MeshError
-from tests.reference_sim.meshes import grid
 
 KITE = np.array([(0, 0, 0), (2, 0, 0), (1, 1, 0), (1, -3, 0)], dtype=float)
 KITE_FACES = np.array([(0, 1, 2), (1, 0, 3)])
@@ -25,26 +24,6 @@ def test_two_triangles_by_hand():
     assert cloth.hinge_areas == pytest.approx([4.0], rel=1e-15)
     assert cloth.vertex_areas == pytest.approx([4 / 3, 4 / 3, 1 / 3, 1.0], rel=1e-15)
     assert cloth.masses == pytest.approx([8 / 3, 8 / 3, 2 / 3, 2.0], rel=1e-15)
-
-
-def test_rest_uv_replaces_the_rest_state_of_everything_but_the_start():
-    x, faces = grid(3, 2)
-    cloth = Cloth(x, faces, rest_uv=2 * x[:, [2, 0]])
-    plain = Cloth(x, faces)
-    assert cloth.areas == pytest.approx(4 * plain.areas, rel=1e-15)
-    assert cloth.edge_lengths == pytest.approx(2 * plain.edge_lengths, rel=1e-15)
-    assert cloth.hinge_areas == pytest.approx(4 * plain.hinge_areas, rel=1e-15)
-    assert (cloth.rest_positions == x).all()
-
-
-def test_a_cloth_keeps_its_rest_state_when_the_callers_arrays_change():
-    x, faces = grid(2, 2)
-    given = [x.copy(), faces.copy(), x[:, [0, 2]].copy()]
-    cloth = Cloth(*given[:2], rest_uv=given[2])
-    for array in given:
-        array[:] = 0
-    assert (cloth.rest_positions == x).all() and (cloth.faces == faces).all()
-    assert cloth.areas == pytest.approx(Cloth(x, faces).areas)
 
 
 def moved(index: int, to: tuple[float, float, float]) -> np.ndarray:

@@ -12,7 +12,6 @@ to nine digits, and is short enough that round-off does not grow into another wr
 from __future__ import annotations
 
 import csv
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
@@ -96,12 +95,8 @@ def carried() -> Trajectory:
     turns = 0.05 * np.arange(6)
     turned = [points @ rotation_about_y(a).T + [0.2 * a, 0.1 * a, 0.0] for a in turns]
     obstacle = Obstacle(np.stack(turned), triangles, rest_positions=points, region=0.15)
-    energies = [
-        StretchStVK(cloth),
-        BendHinge(cloth),
-        Gravity(cloth),
-        ContactPenalty(cloth, samples="vertices"),
-    ]
+    contact = ContactPenalty(cloth, samples="vertices")
+    energies = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), contact]
     options = {"guess": "extrapolated", "tolerance": TOLERANCE}
     return simulate(cloth, energies, frames=6, obstacle=obstacle, substeps=2, **options)
 
@@ -111,14 +106,7 @@ def rotation_about_y(angle: float) -> np.ndarray:
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
 
-SCENES: dict[str, Callable[[], Trajectory]] = {
-    "free_fall": free_fall,
-    "hanging": hanging,
-    "springs": springs,
-    "ball": ball,
-    "squeezed": squeezed,
-    "carried": carried,
-}
+SCENES = {scene.__name__: scene for scene in (free_fall, hanging, springs, ball, squeezed, carried)}
 
 
 def computed(name: str) -> Energies:
