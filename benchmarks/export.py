@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.methods import find_method
 from benchmarks.plan.options import add_study_options, study_of
-from benchmarks.plan.plan import plan_scene
+from benchmarks.plan.plan import make_plan
 from benchmarks.plan.study import StudyError
 from benchmarks.timing import one_thread
 from reference_sim.command_line import Parser, command
@@ -54,7 +55,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"{len(written)} training motions of {garment} in {folder}")
         return 0
     demand_new(folder)
-    plan = plan_scene(study_of(options), options.scene)
+    study = replace(study_of(options), scenes=(options.scene,), methods=("simulation",))
+    plan = make_plan(study, folder=folder)
+    if len(plan.scenes) != 1:
+        raise StudyError(f"{options.scene}: name one scene; see python -m benchmarks.run --list")
     try:
         scene = plan.scenes[0].build(plan.open_assets() if plan.garments else None)
         from benchmarks.external.scene_files import write_scene  # loads the simulator

@@ -13,14 +13,14 @@ from benchmarks.assets import Assets, Inputs, embedded_motions, open_assets, rea
 from benchmarks.declarations import by_name
 from benchmarks.external.roll_out_files import MODULE as STORED
 from benchmarks.method import Training, installed
-from benchmarks.methods import METHODS, find_method
+from benchmarks.methods import METHODS
 from benchmarks.methods.declared_networks import TRAININGS
 from benchmarks.metrics import declared
 from benchmarks.plan import user_files
 from benchmarks.plan.cell import Cell, TaskId
 from benchmarks.plan.choose_cells import ReadStudy, choose_cells
 from benchmarks.plan.motions import Motions, split_motions
-from benchmarks.plan.study import Study, StudyError, nearest
+from benchmarks.plan.study import Study, StudyError
 from benchmarks.presets import find_preset
 from benchmarks.provenance import usable_cores
 from benchmarks.results.protocol import NUMBER, OWN
@@ -230,19 +230,6 @@ def make_plan(
         scheduler=scheduler,
         **further,
     )
-
-
-def plan_scene(study: Study, name: str) -> Plan:
-    """Return the plan of one scene by the simulation alone, in no folder: for export and check.
-
-    Raises:
-        ValueError: one line for the first thing that cannot be met.
-    """
-    read = read_files(study)
-    if name not in read.scenes:
-        raise StudyError(f"no scene '{name}'; {nearest(name, list(read.scenes))}")
-    cell = Cell(read.scenes[name].at(study.sizes), find_method("simulation"), 0, ("speed",))
-    return Plan(study=study, cells=(cell,), motions=read.motions, inputs=read.inputs)
 
 
 def read_files(study: Study, scenes: Sequence[Scene] = ()) -> ReadStudy:
