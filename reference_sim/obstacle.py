@@ -49,13 +49,11 @@ class Obstacle:
         positions: (T, B, 3) [m], or (B, 3) for one that stands still.
         faces: (F, 3) outward wound.
         rest_positions: (B, 3) [m], the obstacle in the pose in which the cloth was made. With it, a cloth
-            sample only ever meets faces whose rest centroid lies within `region` of the sample's own rest
-            position (the whole mesh, where there is none): without that rule arms hold the shirt fast and
-            legs the hem.
-        region: radius of that rule [m].
+            sample only ever meets faces whose rest centroid lies within `region` [m] of the sample's own
+            rest position (the whole mesh, where there is none): without that rule arms hold the shirt
+            fast and legs the hem.
 
-    Raises:
-        MeshError: wrong shapes, NaN, a mesh that is no closed surface (see `check_closed`).
+    Raises MeshError for wrong shapes, NaN, a mesh that is no closed surface (see `check_closed`).
 
     Example: a tetrahedron that rises by a centimetre a frame.
 
@@ -106,10 +104,7 @@ class Obstacle:
         return (len(self.positions) - 1) * self._substeps + 1
 
     def at(self, frame: int) -> np.ndarray:
-        """Return the vertices (B, 3) [m] at `frame`; the last frame holds on for ever.
-
-        Raises ValueError for a frame below 0.
-        """
+        """Return the vertices (B, 3) [m] at `frame` from 0 on; the last frame holds on for ever."""
         if frame < 0:
             raise ValueError(f"obstacle: frame {frame}: frames count from 0")
         whole, part = divmod(min(frame, self.frames - 1), self._substeps)
@@ -178,9 +173,7 @@ class Obstacle:
     ) -> np.ndarray:
         """Return points (N, 3) [m] of frame - 1 moved along with the body, each beside its nearest face.
 
-        At frame 0 nothing has moved.
-
-        The best known initial guess for a garment: the body's own motion, face by face.
+        The best known initial guess for a garment. At frame 0 nothing has moved.
         """
         before = max(frame - 1, 0)
         closest = self._nearest(points, before, rest_points)

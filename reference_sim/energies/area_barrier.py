@@ -22,10 +22,7 @@ if TYPE_CHECKING:
 
 
 class AreaBarrier(Energy):
-    """Barrier energy [J] of each face of `cloth`; stiffness kappa [J/m^2], threshold q0 [1].
-
-    Raises ValueError for a stiffness that is negative, a threshold that is not above 0, or one not finite.
-    """
+    """Barrier energy [J] of each face of `cloth`; stiffness kappa [J/m^2], threshold q0 [1] above 0."""
 
     name = "area_barrier"
 

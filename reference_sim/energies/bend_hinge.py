@@ -33,12 +33,8 @@ BLOCKS = 39  # rows of lanes before those of the blocks, in _hessian
 class BendHinge(Energy):
     """Hinge bending energy [J] of each inner edge of `cloth`, whose material gives k [J].
 
-    Args:
-        scaling: "length_area" or "none" (as the paper prints it).
-        rest_angles: (H,) [rad], "rest" for the angles of rest_positions, or 0 (default: flat).
-
-    Raises:
-        ValueError: unknown scaling or wrong number of rest angles.
+    scaling: "length_area" or "none" (as the paper prints it). rest_angles: (H,) [rad], "rest" for the
+    angles of rest_positions, or one number. Raises ValueError for others.
     """
 
     name = "bending"
@@ -136,8 +132,7 @@ def dihedral_angles(x, hinges):
 def _gradient(x, hinges, stiffness, rest, gradient):
     """Add the forces (V, 3) [N] to gradient; returns the energy [J].
 
-    LANES_FLOAT64 hinges lie side by side, for vector instructions: from corners, stiffness and rest angle in
-    u to forces and energy. An incomplete group is filled up with the last hinge.
+    An incomplete group of LANES_FLOAT64 hinges (kernels.lanes) is filled up with the last one.
     """
     L, count, total = LANES_FLOAT64, len(hinges), 0.0
     u = np.empty(14 * L)
@@ -181,8 +176,6 @@ def _gradient(x, hinges, stiffness, rest, gradient):
 @njit(cache=True, error_model="numpy")
 def _hessian(x, hinges, stiffness, rest, convexity, slots, base, stride, data):
     """Add k [grad theta grad theta^T + (1 - convexity) (theta - theta_0) Hess theta] to data.
-
-    LANES_FLOAT64 hinges lie side by side.
 
     With the edge's length L and direction e, the foot t of a face's tip, m = n/|n|^2, p = m x e, the weights
     w = (L - t, t, -L) and signs r = (-1, 1, 0) of the edge's ends and the tip, and c = |n|^2 / (2 L^2), the

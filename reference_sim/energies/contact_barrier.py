@@ -36,15 +36,10 @@ LONGEST_STEP = 0.05  # [m] of a vertex in a line search: a step of a metre would
 
 
 class ContactBarrier(Energy):
-    """Barrier energy [J] of `cloth` against itself.
+    """Barrier energy [J] of `cloth` against itself; distance dhat [m], stiffness kappa [Pa].
 
-    Args:
-        distance: dhat [m], where the barrier begins; must be below every height of a rest triangle.
-        stiffness: kappa [Pa].
-
-    Raises:
-        ImportError: ipctk is not installed.
-        ValueError: distance or stiffness not positive, distance above a height of a rest triangle.
+    Raises ImportError without ipctk, ValueError for one that is not positive, and for a distance above a
+    height of a rest triangle.
     """
 
     name = "barrier"

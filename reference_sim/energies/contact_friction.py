@@ -32,14 +32,8 @@ if TYPE_CHECKING:
 class ContactFriction(Energy):
     """Friction energy [J] of each sample of a ContactPenalty, which must come before it in a scene's terms.
 
-    Args:
-        contact: the collision term whose samples, planes and forces are used.
-        coefficient: mu [1].
-        speed: [m/s].
-
-    Raises:
-        ValueError: a negative coefficient, or a speed that is not above 0; in `prepare`, if the contact was
-            not prepared for the step; in evaluations, where the step before was not.
+    The coefficient is mu [1]. Raises ValueError for a negative one, or a speed [m/s] not above 0; in
+    `prepare`, unless the contact was prepared for the step; in evaluations, unless the step before was.
     """
 
     name = "friction"
@@ -64,7 +58,7 @@ class ContactFriction(Energy):
         return {"coefficient": self.coefficient, "speed_m_per_s": self.speed}
 
     def prepare(self, step: Step) -> None:
-        """Freeze planes and normal forces. Raises ValueError unless the contact is prepared for this step."""
+        """Freeze planes and normal forces."""
         planes = self.contact.planes
         if self.contact.step is not step or step.obstacle is None or planes is None:
             raise ValueError("ContactFriction needs its own ContactPenalty before it in the terms")

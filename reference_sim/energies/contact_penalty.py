@@ -216,15 +216,11 @@ DEFAULT_MARGIN = 4e-3  # [m]
 class ContactPenalty(Energy):
     """Penalty energy [J] of each contact sample of `cloth`.
 
-    Args:
-        stiffness: k [J/m^5], per area of sample.
-        margin: eps [m].
-        samples: "all" (vertices, edge midpoints, centroids) or "vertices".
-        per_sample_stiffness: k a_s [J/m^3], the same for every sample, instead of `stiffness`; the paper's
-            form: `ContactPenalty(cloth, samples="vertices", per_sample_stiffness=250, margin=2e-3)`.
+    The stiffness is k [J/m^5], the margin eps [m]; samples are "all" (vertices, edge midpoints,
+    centroids) or "vertices". per_sample_stiffness is k a_s [J/m^3], the same for every sample, instead;
+    the paper's form: `ContactPenalty(cloth, samples="vertices", per_sample_stiffness=250, margin=2e-3)`.
 
-    Raises:
-        ValueError: unknown kind of samples, or a stiffness or margin that is negative or not finite.
+    Raises ValueError for other samples, or a stiffness or margin that is negative or not finite.
     """
 
     name = "collision"

@@ -29,12 +29,7 @@ def batch(term: Gravity) -> BatchKernel:
 
 
 class Gravity(Energy):
-    """Potential energy of the weight [J] of each vertex of `cloth`.
-
-    Args:
-        origin_height: y0 [m] where the energy is zero.
-        acceleration: g [m/s^2].
-    """
+    """Potential energy of the weight [J] of each vertex of `cloth`; y0 [m], acceleration g [m/s^2]."""
 
     name = "gravity"
     constant = (3,)
@@ -67,5 +62,5 @@ class Gravity(Energy):
         return float(self.weights @ (x[:, 1] - self.origin_height)), gradient
 
     def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
-        """Return the vertices (n,) with second derivatives, and these (n, 3, 3) [N/m]; see Energy."""
+        """Return no blocks: the energy is linear."""
         return np.arange(0), np.zeros((0, 3, 3))

@@ -41,10 +41,7 @@ class Inertia(Energy):
         self.x_hat = step.previous + step.dt * step.velocity
 
     def energy(self, x: Tensor, x_hat: Tensor | None = None) -> Tensor:
-        """Return E [J] of each vertex: x, x_hat (..., V, 3) [m] -> (..., V).
-
-        x_hat defaults to the prepared one.
-        """
+        """Return E [J] of each vertex: x, x_hat (by default the prepared one) (..., V, 3) [m] -> (..., V)."""
         import torch
 
         target = torch.as_tensor(self.x_hat).to(x) if x_hat is None else x_hat

@@ -15,10 +15,7 @@ if TYPE_CHECKING:
 
 
 class StretchSpring(Energy):
-    """Spring energy [J] of each edge of `cloth`; stiffness [N/m] is the same for all edges.
-
-    Raises ValueError for a stiffness that is negative or not finite.
-    """
+    """Spring energy [J] of each edge of `cloth`; stiffness k [N/m], at least 0, of all edges alike."""
 
     name = "spring"
     constant = (1,)

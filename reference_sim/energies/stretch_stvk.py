@@ -123,9 +123,8 @@ class StretchStVK(Energy):
 def _gradient(x, faces, Dm_inverse, areas, lam, mu, gradient):
     """Add dE/dx_a = A F S b_a to gradient; returns the energy [J].
 
-    S = lambda tr(G) I + 2 mu G, and b_a is the gradient of the hat function. LANES_FLOAT64 faces lie side by
-    side, for vector instructions: from corners, Dm^-1 and area in u to forces and energy. An incomplete group
-    is filled up with the last face.
+    S = lambda tr(G) I + 2 mu G, and b_a is the gradient of the hat function. An incomplete group of
+    LANES_FLOAT64 faces side by side (kernels.lanes) is filled up with the last one.
     """
     L, count, total = LANES_FLOAT64, len(faces), 0.0
     u = np.empty(14 * L)
@@ -210,10 +209,7 @@ def _linear_stress(x, step, faces, Dm_inverse, lam, mu, stress):
 
 @njit(cache=True, error_model="numpy")
 def _hessian(x, faces, Dm_inverse, areas, lam, mu, stress, slots, base, stride, data):
-    """Add K_ac = A [(b_a.S b_c) I + lambda (F b_a)(F b_c)^T + mu ((F b_c)(F b_a)^T + (b_a.b_c) F F^T)].
-
-    LANES_FLOAT64 faces lie side by side; stress (F, 3) holds S00, S11, S01.
-    """
+    """Add A [(b_a.S b_c) I + lambda (F b_a)(F b_c)^T + mu ((F b_c)(F b_a)^T + (b_a.b_c) F F^T)]."""
     L, count = LANES_FLOAT64, len(faces)
     u = np.empty((BLOCKS + 54) * L)
     for begin in range(0, count, L):

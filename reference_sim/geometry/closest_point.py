@@ -227,12 +227,10 @@ class Closest:
 
 
 class FaceSearch:
-    """Search of closest faces of a mesh whose vertices move. Call `refit` before the first search.
+    """Search of closest points on faces (F, 3) that move. Call `refit` before the first search.
 
-    Args:
-        faces: (F, 3), at least one.
-        centroids: (F, 3) [m], their centroids at rest, in a pose that spreads the mesh: by them leaves are
-            made and the rule of regions decides. Positions are kept in their type, float64 or float32.
+    By the centroids (F, 3) [m] at rest, in a pose that spreads the mesh, leaves are made and the rule of
+    regions decides. Positions are kept in their type, float64 or float32.
     """
 
     def __init__(self, faces: np.ndarray, centroids: np.ndarray) -> None:
@@ -297,15 +295,12 @@ class FaceSearch:
         samples: Listed | None = None,
         exact: float = np.inf,
     ) -> Closest:
-        """Find the closest points of the mesh.
+        """Find the points of the mesh closest to points (S, 3) [m].
 
-        Args:
-            points: (S, 3) [m] samples.
-            hints: (S,) faces to begin with, -1 for none. They change the cost and, but for `exact`, no
-                answer.
-            samples: as `listed` gives it for the samples; without, any face may be met.
-            exact: [m] a sample farther away than this may get any point at most twice as far as the closest:
-                a remembered face then often does, for a third of the cost.
+        hints: (S,) faces to begin with, -1 for none. They change the cost and, but for `exact`, no
+        answer. samples: as `listed` gives it for the samples; without, any face may be met. exact: [m] a
+        sample farther away than this may get any point at most twice as far as the closest: a remembered
+        face then often does, for a third of the cost.
         """
         points = np.ascontiguousarray(points, self._mesh.corners.dtype)
         faces = np.full(len(points), -1) if hints is None else np.array(hints, np.int64)

@@ -19,13 +19,9 @@ REFERENCE_DT = 1 / 30  # [s], in shifts by M/dt^2 of a potential without inertia
 class FactorisedHessian:
     """The Hessian over the free vertices: one symbolic analysis serves every step.
 
-    Args:
-        tolerance: of the relative residual, below which curvature is compared.
-
     Attributes:
         metric: (3n,) M/dt^2 [N/m], the unit of shifts.
-        flat: curvature [N/m] below which a direction gains less than the tolerance over the cloth's
-            width.
+        flat: curvature [N/m] below which a direction gains less than the tolerance over a cloth's width.
         static: whether the potential has no inertia, so that rigid motions may have no curvature.
     """
 
@@ -119,10 +115,7 @@ def convergence_check(run: NewtonRun, values: np.ndarray, round_off: float) -> S
 
 
 def escape_saddle(run: NewtonRun, values: np.ndarray, length: float) -> bool:
-    """Step along the direction of most negative curvature.
-
-    length: of the first step tried [m]. Returns whether the energy fell.
-    """
+    """Step along the most negative curvature, `length` [m] first; return whether the energy fell."""
     v = most_negative(run, values)
     if v is None:
         return False
@@ -140,10 +133,7 @@ def escape_saddle(run: NewtonRun, values: np.ndarray, length: float) -> bool:
 
 
 def most_negative(run: NewtonRun, values: np.ndarray) -> np.ndarray | None:
-    """Return the direction (3n,) of most negative curvature by inverse iteration.
-
-    None if no shift outdoes it.
-    """
+    """Return the direction (3n,) of most negative curvature by inverse iteration, or None."""
     shift = 1.0
     while not run.factorise(values, shift):
         shift *= 4

@@ -88,13 +88,10 @@ class SubspaceRun(NewtonRun):
 
 
 class SubspaceNewton(Newton):
-    """Newton's method from step to step in a subspace that follows its placements.
+    """Newton's method from step to step in a subspace that follows its placements, one for each step.
 
-    Args:
-        basis: U, (V, 3, K), with orthonormal columns; zero at pinned vertices.
-        placements: one for each step of a run.
-        offsets: (V, 3) in the span: where the first step of a run starts.
-        options: of Newton.
+    The basis U (V, 3, K) has orthonormal columns, and is zero at pinned vertices. The first step of a run
+    starts at offsets (V, 3) in the span. options: of Newton.
     """
 
     def __init__(
