@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.method import MethodEntry, Reporting
+from benchmarks.methods import METHODS
 from benchmarks.results.row import Row
 from benchmarks.results.run_folder import FORMAT, RunFolder
 from reference_sim import Trajectory
@@ -17,48 +19,11 @@ from reports.finished_run import RollOuts, Run, make_run
 from reports.tables import make_tables
 
 TERMS = {"strain": 0.1, "bending": 0.01, "gravity": 0.3, "inertia": 0.004, "collision": 0.02}
-METHODS = {"simulation": 1.0, "skinning": 9.0, "snug": 2.0, "pbns": 3.0}
+SHOWN = {"simulation": 1.0, "skinning": 9.0, "snug": 2.0, "pbns": 3.0}
 SCENES = ("tshirt/walk", "tshirt/jump")
 FRAMES = 5
 
-# What rows and run.json declare of the methods in these tests; any other is a network of its own.
-SOLVERS = {"newton": "Newton", "lbfgs": "L-BFGS"}
-DECLARED: dict[str, dict[str, Any]] = {
-    "simulation": {"label": "Simulation", "role": "reference"},
-    "simulation-perturbed-1e-4": {
-        "label": "Simulation, start moved", "role": "reference-variant",
-        "family": "simulation-perturbed", "level": 1e-4,
-    },
-    "simulation-1e-8": {
-        "label": "Simulation, to 1e-8", "role": "reference-variant",
-        "family": "simulation-tolerance", "level": 1e-8,
-    },
-    "skinning": {"label": "Skinning alone", "role": "baseline"},
-    "untrained": {"label": "SNUG, untrained", "role": "baseline", "seeded": True},
-    "snug": {"label": "SNUG"},
-    "pbns": {"label": "PBNS"},
-    "supervised": {"label": "Supervised"},
-    "snug+cleanup": {"label": "SNUG, cleaned up", "base": "snug", "pairing_group": "snug"},
-    **{
-        f"snug-{name}": {
-            "role": "ablation", "base": "snug", "pairing_group": "snug", "label": f"SNUG, {name}",
-        }
-        for name in ("no-inertia", "no-strain")
-    },
-    **{
-        f"{name}-{k}": {"role": "solver", "family": name, "level": k, "label": f"{solver}, {k} iterations"}
-        for name, solver in SOLVERS.items()
-        for k in (1, 2, 4, 5, 8, 10, 16, 20)
-    },
-    **{
-        f"{base}+lbfgs-{k}": {
-            "role": "warm-started", "family": f"{base}+lbfgs", "level": k, "base": base,
-            "label": f"{base.upper()} + L-BFGS, {k} iterations",
-        }
-        for base in ("snug", "skinning")
-        for k in (1, 4)
-    },
-}  # fmt: skip
+DECLARED = {entry.name: entry for entry in METHODS}  # any other is a network of its own
 TABLES = {
     "energy": "energies", "curvature": "curvature", "cost": "cost", "distance": "penetration",
     "penetration": "penetration", "gap": "speed", "step": "speed", "gradient": "speed",
@@ -75,14 +40,14 @@ BETTER_LOWER = ("energy/strain", "energy/total", "curvature/error", "penetration
 
 def row(scene="tshirt/walk", method="snug", metric="energy/strain", value=1.0, *, seed=0, **more) -> Row:
     """A row with the columns that its scene and method declare."""
-    entry = DECLARED.get(method, {})
-    network = entry.get("role", "network") in ("network", "ablation", "warm-started")
+    own = MethodEntry(name=method, description="", role="network", seeded=True,
+                      reporting=Reporting(pairing_group=method))  # fmt: skip
+    entry = DECLARED.get(method, own)
     garment, _, motion = scene.partition("/")
     declared = {
-        "role": entry.get("role", "network"), "family": entry.get("family", method),
-        "base": entry.get("base", ""), "level": entry.get("level"),
-        "seeded": entry.get("seeded", network) and not metric.startswith("cost/"),
-        "pairing_group": entry.get("pairing_group", method if network else ""),
+        "role": entry.role, "family": entry.reporting.family or method, "base": entry.reporting.base,
+        "level": entry.reporting.level, "seeded": entry.seeded and not metric.startswith("cost/"),
+        "pairing_group": entry.reporting.pairing_group,
         "garment": garment if motion else "", "motion": motion, "part": "whole" if motion else "",
     }  # fmt: skip
     more = {"suite": "garments", "unit": "J", "hardware": "here", **declared, **more}
@@ -115,7 +80,7 @@ def declaration(rows: Sequence[Row], **more) -> dict[str, Any]:
             }
             for name, r in metrics.items()
         },
-        "methods": {name: {"label": entry["label"]} for name, entry in DECLARED.items()},
+        "methods": {name: {"label": entry.label} for name, entry in DECLARED.items()},
         "scenes": {r.scene: {} for r in sorted(rows, key=lambda r: r.garment != "tshirt") if r.garment},
         "cases": cases,
         **more,
@@ -185,7 +150,7 @@ def all_rows() -> list[Row]:
     """Two scenes on a body, a truncated solver, a scene without a body, checks and stress tests."""
     rows = []
     for number, scene in enumerate(SCENES):
-        for method, factor in METHODS.items():
+        for method, factor in SHOWN.items():
             for term, value in TERMS.items():
                 rows.append(row(scene, method, f"energy/{term}", factor * value * (1 + number)))
             rows.append(row(scene, method, "energy/total", factor * (1 + number)))

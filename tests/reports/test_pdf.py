@@ -13,7 +13,7 @@ from reports.figures.plotting import draw_figures
 from reports.finished_run import read_run
 from reports.pdf import write_pdf
 from reports.tables import make_tables
-from tests.reports.report_folder import METHODS, SCENES, all_rows, row, run_folder, write_roll_outs
+from tests.reports.report_folder import SCENES, SHOWN, all_rows, row, run_folder, write_roll_outs
 
 pdfium = pytest.importorskip("pypdfium2", reason="the test extra is not installed")
 
@@ -53,9 +53,7 @@ def report(tmp_path_factory):
     """The pages of a report with roll-outs."""
     rows, provenance = hostile_rows(), {"commit": "abc", "started": "2030-01-02T03:04:05+00:00"}
     run = run_folder(tmp_path_factory.mktemp("run"), rows, preset="smoke", **provenance)
-    write_roll_outs(
-        run, {r.scene for r in rows if r.garment}, {r.method for r in rows} & {*METHODS, *HOSTILE}
-    )
+    write_roll_outs(run, {r.scene for r in rows if r.garment}, {r.method for r in rows} & {*SHOWN, *HOSTILE})
     read = read_run(run)
     pictures = draw_figures(read, run.figures, FIGURES)
     write_pdf(run, Report(read, make_tables(read), pictures))

@@ -7,9 +7,8 @@ from dataclasses import replace
 import pytest
 
 from benchmarks.external.roll_out_files import KEYS
-from benchmarks.results.row import COLUMNS, Row
+from benchmarks.results.row import COLUMNS
 from reports.docs import documents, main
-from reports.finished_run import make_run
 from reports.statistics.effects import EXCESS, Effect
 from reports.statistics.means_and_spreads import Mean
 from reports.tables import make_tables
@@ -25,9 +24,9 @@ from reports.text.published_parts import (
 from reports.text.text_table import answer, remarks_on, text_rows
 from snug.body.smpl_files import SYNONYMS
 from snug.motion.files import ARRAY_NAMES
-from tests.reports.report_folder import DECLARED, row, run_of
+from tests.reports.report_folder import row, run_of
 
-RUN = make_run({"methods": DECLARED}, [Row("garments", "a/b", "snug", 0, "energy/total", "J", 1.0)])
+RUN = run_of([row("a/b", "snug", "energy/total")])
 
 
 def small_table() -> Table:

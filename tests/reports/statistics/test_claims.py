@@ -28,12 +28,12 @@ STRAIN = ("energy/strain", "snug", "pbns")
 MOTIONS = tuple(f"tshirt/{name}" for name in ("kick", "walk", "jump", "bow"))  # the least that are judged
 
 
-def seeds(method, values, metric="energy/strain", *, seed_from=0, **more):
+def seeds(method, values, metric="energy/strain", **more):
     """A row of each motion with each seed; the value is the seed's, whatever the motion."""
     return [
         row(scene, method, metric, value, seed=seed, **more)
         for scene in MOTIONS
-        for seed, value in enumerate(values, seed_from)
+        for seed, value in enumerate(values)
     ]
 
 
@@ -123,9 +123,8 @@ def test_two_orders_of_magnitude_are_judged_with_their_factor(supervised, verdic
     rows = costs("snug", 100.0) + costs("tailornet", 0.3 * supervised, data=0.7 * supervised)
     line = told(rows)[BEFORE.name, "snug", "tailornet"]
     assert line.claim.factor == 100.0 and line.verdict == verdict
-    assert line.compared.one.value == pytest.approx(101.0) and line.compared.other.value == pytest.approx(
-        supervised + 1.0
-    )
+    means = line.compared.one.value, line.compared.other.value
+    assert means == pytest.approx((101.0, supervised + 1.0))
     assert line.compared.effect.shown == pytest.approx(101.0 / (supervised + 1.0), rel=1e-3)
     # What its simulations took is not known any more: there is no sum.
     unknown = [r for r in rows if (r.method, r.metric) != ("tailornet", "cost/data")]
@@ -145,12 +144,9 @@ def test_two_orders_of_magnitude_are_judged_with_their_factor(supervised, verdic
 )
 def test_parity_holds_where_no_more_than_the_margin_is_possible(rival, verdict):
     amplitudes = (0.1, 0.1002, 0.1001)
-    rows = [
-        r
-        for m, v in (("snug", amplitudes), ("santesteban2019", rival))
-        for r in seeds(m, v, "dynamics/amplitude")
-    ]
-    assert told(rows)["dynamics/amplitude", "santesteban2019", "snug"].verdict == verdict
+    given = seeds("snug", amplitudes, "dynamics/amplitude")
+    given += seeds("santesteban2019", rival, "dynamics/amplitude")
+    assert told(given)["dynamics/amplitude", "santesteban2019", "snug"].verdict == verdict
 
 
 # The one row of a network's cell without numbers.
@@ -220,11 +216,7 @@ def test_the_share_of_frames_with_more_energy_is_counted_scene_by_scene_and_seed
     shares = made[made["metric"] == share_of_frames("strain").name]
     percentages = {(line.method, line.seed): line.value for line in shares.itertuples()}
     assert percentages == {("snug", 0): 25.0, ("snug", 1): 0.0, ("pbns", 0): 50.0, ("pbns", 1): 100.0}
-    assert (
-        set(shares["unit"]) == {"%"}
-        and shares["usable"].all()
-        and len(made) == len(run.frame) + 4 * len(MOTIONS)
-    )
+    assert set(shares["unit"]) == {"%"} and shares["usable"].all() and len(shares) == 4 * len(MOTIONS)
     assert len(with_shares(run.frame, frames, "inertia", "snug", "pbns")) == len(run.frame)
 
 
