@@ -20,7 +20,7 @@ from benchmarks.plan.study import read_fields, read_study
 from benchmarks.presets import find_preset
 from benchmarks.provenance import digest_of_file
 from benchmarks.results.protocol import DIGEST, NUMBER
-from benchmarks.results.row import USABLE, Row
+from benchmarks.results.row import USABLE
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.run import carry_out
 from benchmarks.score import MEASURED_BESIDE
@@ -198,15 +198,15 @@ def check_scores(entry: Entry) -> None:
         raise EntryError(f"{entry.path}: not as it was scored: {names}: put it right, or score it again")
 
 
-def scores_of(entry: Entry, run: RunFolder) -> list[Row]:
-    """Return the rows of an entry, of simulation and skinning, without what the machine adds to them.
+def write_scores(entry: Entry, run: RunFolder) -> int:
+    """Write rows without what the machine adds to them, and digests of all that was scored; return how many.
 
-    Raises EntryError where a roll-out did not come to its last frame: the mean over the other scenes would be
-    of easier ones.
+    The bytes are the same each time. Raises EntryError where a roll-out did not come to its last frame: the
+    mean over the other scenes would be of easier ones.
     """
     from benchmarks.metrics import find_metric  # loads numpy
 
-    kept = [
+    rows = [
         replace(row, commit="", hardware="")
         for row in run.read_rows()
         if row.value is None
@@ -214,17 +214,12 @@ def scores_of(entry: Entry, run: RunFolder) -> list[Row]:
         or (row.metric, row.method) == (DECLARED, entry.name)
     ]
     for scene in entry.scenes:
-        mine = [row for row in kept if (row.scene, row.method) == (scene, entry.name)]
+        mine = [row for row in rows if (row.scene, row.method) == (scene, entry.name)]
         bad = next((row for row in mine if row.status not in USABLE), None)
         if bad or not mine:
             why = f"seed {bad.seed}: {bad.status}: {bad.reason}" if bad else "it did not run"
             raise EntryError(f"{entry.path}: {scene}: {why}")
-    return kept
-
-
-def write_scores(entry: Entry, run: RunFolder) -> int:
-    """Write rows, and digests of all that was scored, the same bytes each time; return the number of rows."""
-    rows, config, folder = scores_of(entry, run), run.read_config(), entry.scores
+    config, folder = run.read_config(), entry.scores
     folder.path.mkdir(exist_ok=True)
     folder.write_rows(rows)
     folder.write_config({

@@ -183,11 +183,6 @@ def write_scene(
             write_point_cache(part / "reference.pc2", trajectory)
             positions, faces = trajectory.positions, trajectory.faces
             np.savez(part / "reference.npz", positions=positions, faces=faces, fps=1.0 / scene.dt)
-        text = readme(facts, NOT_SCORED if declared.networks_only else SCORED)
-        (part / "README.txt").write_text(text, encoding="utf-8")
-
-
-def readme(facts: dict[str, Any], scored: str) -> str:
-    """Return the text of README.txt: content, units and order of each file, and how to be scored."""
-    # All digits: a roll-out is held to the scene's rate.
-    return (README + scored).format(rate=np.format_float_positional(facts["fps"], trim="-"), **facts)
+        text = README + (NOT_SCORED if declared.networks_only else SCORED)
+        rate = np.format_float_positional(facts["fps"], trim="-")  # all digits: a roll-out is held to it
+        (part / "README.txt").write_text(text.format(rate=rate, **facts), encoding="utf-8")

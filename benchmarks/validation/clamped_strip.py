@@ -30,14 +30,7 @@ ROWS = 2  # cells across a strip: narrow, so that the cross-section never has to
 
 @cache
 def exact_elastica(weight: float, load: float) -> tuple[np.ndarray, np.ndarray]:
-    """Integrate the elastica of length 1 under its weight and a force at its end.
-
-    Returns:
-        s (n,) and (x, drop) (2, n), all over the length.
-
-    Raises:
-        RuntimeError: scipy finds no solution.
-    """
+    """Return s (n,) and (x, drop) (2, n) of the elastica of length 1. Raises as `integrated_elastica`."""
     s = np.linspace(0, 1, 200)
     y = np.zeros((4, len(s)))  # theta, theta', x, drop
     for f in np.linspace(0.05, 1, 20):  # the load grows, each shape starting from the last

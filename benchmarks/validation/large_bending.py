@@ -75,8 +75,7 @@ def bent_strip(
 def tip_distance(weight: float = 0.0, load: float = 0.0) -> float:
     """Return the distance of a cantilever's tip to the elastica, over its length, worst of the families.
 
-    It bends under a weight, Gamma, or under a force at the end. Where all diagonals lean one way, as in
-    family "right", which is left out, the strip twists and is no elastica.
+    Where all diagonals lean one way, as in family "right", the strip twists and is no elastica.
     """
     bent = (bent_strip(family, weight, load) for family in SYMMETRIC)
     return max(float(np.linalg.norm(ours - exact)) for ours, exact in bent)

@@ -61,10 +61,13 @@ def folded(scaling: str, fold: float) -> float:
 @known_answer(expected=1.0, tolerance=1e-12, reason="round-off")
 def hinges_past_half_a_turn() -> float:
     """Return the energy with rest angles of 3 rad and a fold of -3 rad: the short way is 2 pi - 6."""
+    from reference_sim.energies.bend_hinge import dihedral_angles
+
     cloth, x = _folded(-3.0)
     upright = np.ptp(cloth.rest_positions[cloth.hinges[:, :2], 0], axis=1) < 1e-9
     # The sign of a hinge's angle follows from its numbering; a fold of -3 is -3 or 3 there.
-    angles = np.where(upright, -_signs(cloth) * 3.0, 0.0)
+    signs = np.sign(dihedral_angles(_folded(-0.1)[1], cloth.hinges))
+    angles = np.where(upright, -signs * 3.0, 0.0)
     bend = energies.BendHinge(cloth, rest_angles=angles)
     exact = upright.sum() * _scale() * cloth.material.bending_stiffness / 2 * (2 * np.pi - 6) ** 2
     return bend.value_and_gradient(x)[0] / exact
@@ -95,13 +98,6 @@ def _folded(fold: float) -> tuple[sim.Cloth, np.ndarray]:
     column = np.rint(points[:, 0] / CELL).astype(int)
     x = np.stack([profile[column, 0], points[:, 1], profile[column, 1]], axis=1)
     return flat_cloth(points, faces), x @ random_rotation(4).T
-
-
-def _signs(cloth: sim.Cloth) -> np.ndarray:
-    """Return the sign of each hinge's angle where the strip is folded by a small negative angle, (H,)."""
-    from reference_sim.energies.bend_hinge import dihedral_angles
-
-    return np.sign(dihedral_angles(_folded(-0.1)[1], cloth.hinges))
 
 
 STIFFNESS = 1.0  # [J] k; every result is divided by it
