@@ -44,7 +44,7 @@ def measure(roll_out: RollOut) -> dict[str, float]:
         return {}
     terms = energy_series(_scene_of(group.scene, own), [roll_out.positions, least, bare])
     series = [of["total"] if "inertia" in own.terms else of["total"] - of["inertia"] for of in terms]
-    return {NAME: _share(series, roll_out.judged_beside(least))}
+    return _share(series, roll_out.judged_beside(least))
 
 
 def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
@@ -53,7 +53,7 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
     if bare is None or own_energies(roll_out.entry) != DEFAULT:
         return {}
     series = [energies(roll_out)["total"], energies(reference)["total"], bare]
-    return {NAME: _share(series, roll_out.judged_beside(reference.positions))}
+    return _share(series, roll_out.judged_beside(reference.positions))
 
 
 def _scene_of(scene: BuiltScene, recipe: Recipe) -> BuiltScene:
@@ -76,10 +76,13 @@ def _of_skinning(group: SceneRollOuts) -> Floats | None:
     return None if bare is None else energy_series(group.scene, [bare])[0]["total"]
 
 
-def _share(series: Sequence[Floats], judged: slice) -> float:
-    """Return the excess [%] of a method, from its energies (T,), those of the minimiser and of skinning."""
+def _share(series: Sequence[Floats], judged: slice) -> dict[str, float]:
+    """Return the excess [%] of a method, from its energies (T,), those of the minimiser and of skinning.
+
+    Empty where skinning does not lie above the minimiser: there is no such share.
+    """
     method, minimum, bare = (float(energy[judged].mean()) for energy in series)
-    return 100.0 * (method - minimum) / (bare - minimum) if bare > minimum else float("nan")
+    return {NAME: 100.0 * (method - minimum) / (bare - minimum)} if bare > minimum else {}
 
 
 OWN_ENERGIES = Measurements(
