@@ -41,7 +41,7 @@ class Inertia(Energy):
         self.x_hat = step.previous + step.dt * step.velocity
 
     def energy(self, x: Tensor, x_hat: Tensor | None = None) -> Tensor:
-        """Return E [J] of each vertex: x, x_hat (by default the prepared one) (..., V, 3) [m] -> (..., V)."""
+        """Return E [J] (..., V) of each vertex at x (..., V, 3) [m]; by default x_hat is prepared."""
         import torch
 
         target = torch.as_tensor(self.x_hat).to(x) if x_hat is None else x_hat

@@ -116,35 +116,28 @@ SCRATCH_SHAPE = (4, 3)  # numbers that the kernel of a vertex block may use for 
 class VertexBlocks:
     """A term as vertex block descent takes it: what the function for "vertex_block" returns.
 
-    Attributes:
-        kernel: compiled function (data, x, v, g, H, scratch) -> 0.0, which adds the gradient (3,) [N] and a
-            convex Hessian block (3, 3) [N/m] of vertex v at x (V, 3) [m] to g and H. data is (first, corners,
-            *arrays): corner c of element e is e k + c, and those of vertex v are
-            corners[first[v] : first[v + 1]].
-        stencils: (N, k) vertices of the elements.
-        used: (N, k) corners that the element depends on.
-        freeze: function that gives `arrays`, as the step has them.
+    kernel: compiled function (data, x, v, g, H, scratch) -> 0.0, which adds the gradient (3,) [N] and a
+    convex Hessian block (3, 3) [N/m] of vertex v at x (V, 3) [m] to g and H. data is (first, corners,
+    *arrays): corner c of element e is e k + c, and v has corners[first[v] : first[v + 1]].
     """
 
     kernel: Any
-    stencils: np.ndarray
-    used: np.ndarray
-    freeze: Callable[[], tuple[Any, ...]]
+    stencils: np.ndarray  # (N, k) vertices of the elements
+    used: np.ndarray  # (N, k) corners that the element depends on
+    freeze: Callable[[], tuple[Any, ...]]  # gives `arrays`, as the step has them
 
 
 @dataclass(frozen=True)
 class Constraints:
     """A term as XPBD takes it: what the function for "constraint" returns.
 
-    Attributes:
-        kernel: compiled function (data, x, w) -> 0.0, which solves one constraint after the other and moves
-            x (V, 3) [m] in place; w (V,) [m/N] is dt^2 over the mass. A multiplier is a force: the paper's
-            lambda / dt^2.
-        freeze: function that gives `data` as the step has it, with multipliers of zero.
+    kernel: compiled function (data, x, w) -> 0.0, which solves one constraint after the other and moves
+    x (V, 3) [m] in place; w (V,) [m/N] is dt^2 over the mass. A multiplier is a force: the paper's
+    lambda / dt^2.
     """
 
     kernel: Any
-    freeze: Callable[[], tuple[Any, ...]]
+    freeze: Callable[[], tuple[Any, ...]]  # gives `data` as the step has it, with multipliers of zero
 
 
 TRAINING_LANES = 16

@@ -131,14 +131,11 @@ HALF, ONE, TWO, THREE = np.float32(0.5), np.float32(1.0), np.float32(2.0), np.fl
 class Float32Lanes:
     """A term as `CompiledLBFGS` takes it: what the function for "float32_lanes" returns.
 
-    Attributes:
-        gradient: compiled function (data, u, gradient, scratch) -> energy [J] at u (3V,) [m], which adds to
-            gradient (3V,) [N]; u, gradient and scratch (SCRATCH,) are float32.
-        freeze: function of x_0 (V, 3) [m], called once a step; returns `data`, a tuple of arrays and numbers.
-        stiffness: compiled function ((*data, places), values), which adds to the values of the preconditioner
-            a scalar stiffness [N/m] that differs from step to step; None where there is none.
-        stencils: (S, k) vertices that `stiffness` couples; places (B, k k LANES_FLOAT32) are theirs, -1 where
-            nothing is stored.
+    gradient: compiled function (data, u, gradient, scratch) -> energy [J] at u (3V,) [m], which adds to
+    gradient (3V,) [N]; u, gradient and scratch (SCRATCH,) are float32. freeze: function of x_0 (V, 3)
+    [m], called once a step, that returns `data`. stiffness: compiled function ((*data, places), values),
+    which adds a scalar stiffness [N/m] that differs from step to step to the preconditioner, for stencils
+    (S, k) at places (B, k k LANES_FLOAT32), -1 where nothing is stored.
     """
 
     gradient: Any
@@ -170,11 +167,7 @@ def empty_state(vertices: np.ndarray, quantities: int) -> np.ndarray:
 
 @njit(cache=True)
 def set_edges(x, vertices, columns, out):
-    """Write the edges x_(k+1) - x_0, k < columns, of each element into out.
-
-    They are taken from x (V, 3) float64 [m]. With L for LANES_FLOAT32: vertices (B, k L), 3 times the vertex;
-    out (B, 3 columns L) float32.
-    """
+    """Write the edges x_(k+1) - x_0 [m], k < columns, of elements at x (V, 3) into out, in blocks."""
     for b in range(len(vertices)):
         for g in range(LANES_FLOAT32):
             first = vertices[b, g] // 3

@@ -1,10 +1,8 @@
 """Preconditioned L-BFGS that is stopped early, compiled as a whole and in float32.
 
-The method of minimise.LBFGS without its finish by Newton: the same preconditioner (mass over dt^2, the
-cotangent Laplacian, contacts at the start), the same two-loop recursion, the same sufficient decrease. What
-it leaves out: float64, the check of convergence (nothing but a factorised Hessian can say "converged"), and
-all terms that declare no kernel "float32_lanes" (kernels.fast_kernels). Evaluation, two-loop recursion,
-solves and line search are one compiled function, of which the kernels of the terms are arguments.
+The method of minimise.LBFGS without its finish by Newton, without float64, and without terms that declare
+no kernel "float32_lanes" (kernels.fast_kernels). Evaluation, two-loop recursion, solves and line search
+are one compiled function, of which the kernels of the terms are arguments.
 """
 
 from __future__ import annotations
@@ -121,11 +119,10 @@ def descend(
     u, target, vertices, terms, factor, memory, iterations, tolerance, first_step, work, scratch, energies,
     counts,
 ):  # fmt: skip
-    """Run L-BFGS from u (3V,), which becomes the end.
+    """Run L-BFGS from u (3V,), which becomes the end; return the largest component of the gradient [N].
 
-    tolerance: [N] of the largest component of the gradient. first_step: share of the first direction that is
-    tried first. work (4, 3V): room. counts: becomes iterations and first share taken; returns the largest
-    component of the gradient at the end [N].
+    It stops where that is within the tolerance [N]. first_step: share of the first direction that is
+    tried first. work (4, 3V): room. counts: becomes iterations and first share taken.
     """
     gradient, trial_gradient, trial, p = work[0], work[1], work[2], work[3]
     value = evaluate(u, target, vertices, terms, gradient, scratch, energies)
@@ -181,11 +178,7 @@ MEMORY = 10
 
 
 class CompiledLBFGS:
-    """A minimiser bound to one potential.
-
-    It stops after max_iterations, or where the relative residual is within the tolerance. Raises ValueError
-    for a term that it has no kernel for, or no inertia.
-    """
+    """A minimiser of one potential. Raises ValueError for a term without a kernel, or no inertia."""
 
     def __init__(self, potential: Potential, *, max_iterations: int, tolerance: float = TOLERANCE) -> None:
         self.potential, self.max_iterations = potential, max_iterations

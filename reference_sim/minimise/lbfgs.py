@@ -44,14 +44,12 @@ LARGEST_COMPILED = 10_000  # vertices: from about here on a package's factorisat
 class LBFGS:
     """Preconditioned L-BFGS for one potential, finished by Newton's method.
 
+    tolerance, max_iterations, timeout: as in Newton, for both together.
+
     Args:
-        tolerance: as in Newton.
-        max_iterations: iterations, of Newton's too, before giving up with status max_iterations.
         memory: number of remembered steps; 0 is preconditioned gradient descent.
         finish: whether Newton takes over, at SWITCH or COMPILED_SWITCH, or after PATIENCE iterations. Without
-            it the result can only be "max_iterations", "stalled", "timeout" or "diverged": nothing but a look
-            at the curvature can say "converged".
-        timeout: seconds, for both together.
+            it nothing looks at the curvature, and no result is "converged".
     """
 
     def __init__(
@@ -118,7 +116,7 @@ class LBFGS:
         return self._newton.minimise(run.x, after=run)
 
     def terminate(self, run: LBFGSRun) -> Stop | None:
-        """Stop where Newton's method is to take over; nothing but a look at the curvature says converged."""
+        """Stop where Newton's method is to take over."""
         if run.gradient_norm() > self.switch:
             return None
         return Stop("max_iterations", "gradient within tolerance; curvature not checked")

@@ -56,9 +56,8 @@ class Newton:
 
     Args:
         tolerance: largest relative residual at the end, see `Result.gradient_norm`.
-        max_iterations: iterations before giving up with status max_iterations; every direction solved for is
-            one, also one that is taken back.
-        timeout: seconds before giving up with status timeout.
+        max_iterations: before giving up; every direction solved for is one, also one that is taken back.
+        timeout: seconds before giving up.
         reuse: whether a factorisation serves further quasi-Newton steps, each of them an iteration.
         start_projected: whether the first iterations take all negative curvature out: one Hessian is then
             assembled where the search for the least projection assembles five.
