@@ -46,13 +46,9 @@ def by_name(what: str, entries: Iterable[Entry]) -> dict[str, Entry]:
     known: dict[str, Entry] = {}
     for entry in entries:
         if entry.name in known:
-            homes = (
-                getattr(e, "declared_in", "") or "the project itself" for e in (known[entry.name], entry)
-            )
-            raise DeclarationError(
-                f"{what} '{entry.name}' is declared twice, by {' and by '.join(homes)}: "
-                "give each a name of its own"
-            )
+            both = (known[entry.name], entry)
+            homes = " and by ".join(getattr(e, "declared_in", "") or "the project itself" for e in both)
+            raise DeclarationError(f"{what} '{entry.name}' is declared twice, by {homes}: rename one")
         known[entry.name] = entry
     return known
 

@@ -88,12 +88,8 @@ class Scene:
 
     def at(self, preset: Preset) -> Scene:
         """Return the scene with the sizes of a preset among its options. Raises DeclarationError."""
-        for name in self.sizes:
-            if not hasattr(preset, name):
-                raise DeclarationError(
-                    f"scene {self.name}: sizes={self.sizes!r} has {name!r}, which no preset has; "
-                    "it is a tuple of names such as 'sheet_cells'"
-                )
+        if unknown := [name for name in self.sizes if not hasattr(preset, name)]:
+            raise DeclarationError(f"scene {self.name}: sizes: no preset has {', '.join(unknown)}")
         sizes = {name: getattr(preset, name) for name in self.sizes}
         return replace(self, sizes=(), options={**sizes, **self.options})
 
@@ -176,14 +172,10 @@ class BuiltScene:
     def __post_init__(self) -> None:
         by_name("energy", self.energies)  # rows of one would overwrite those of the other
         if self.warm_up < 2:
-            raise ValueError(
-                f"scene {self.name}: warm_up {self.warm_up}: give 2 frames or more, see BuiltScene"
-            )
+            raise ValueError(f"scene {self.name}: warm_up {self.warm_up}: give 2 frames or more")
         if not 0.0 < self.dt <= LONGEST_FRAME:
-            raise ValueError(
-                f"scene {self.name}: dt {self.dt:g}: give the duration of a frame in seconds, above 0 and at "
-                f"most {LONGEST_FRAME:g}"
-            )
+            wanted = f"give the duration of a frame in seconds, above 0 and at most {LONGEST_FRAME:g}"
+            raise ValueError(f"scene {self.name}: dt {self.dt:g}: {wanted}")
 
     @cached_property
     def start_state(self) -> np.ndarray:

@@ -1,14 +1,5 @@
 """Methods: everything that dresses a body or moves a sheet, in one visible tuple.
 
-| module | what lies there |
-| --- | --- |
-| declared_networks, declared_solvers | declarations, and trainings of networks |
-| own_energies | energies that a method was trained on, and the simulation of these |
-| simulation, reference_variants, warm_started, sweeps | solvers of the time step |
-| networks | trained networks, collision post-processing, skinning |
-| lower_bounds | vertices of a clip optimised directly, steps within what a network can express |
-| outside | stored roll-outs and programs |
-
 Nothing of the implementations is imported until a cell needs it.
 
 >>> len({method.name for method in METHODS}) == len(METHODS)

@@ -1,12 +1,5 @@
 """Scenes: the visible tuples of declarations. Nothing is imported until a scene is built.
 
-| module | scenes |
-| --- | --- |
-| sheets | small ones without a body, in SCENES |
-| dressed_body | "<garment>/<motion>": a body in a garment, by GARMENT_SCENES |
-| hard_motions | out of distribution, very long |
-| from_roll_out | the scene that a stored roll-out brings itself |
-
 >>> [scene.name for scene in SCENES][:2]
 ['hanging_sheet', 'sheet_on_sphere']
 """

@@ -38,8 +38,6 @@ def test_of_whole_motions_the_first_alone_is_timed_and_all_else_is_measured_in_a
     assert scenes["tshirt/kick@clip"].timed and scenes["hanging_sheet"].timed
     assert {m.name for m in {*measured_in(None)} - {*measured_in(scenes["tshirt/punch"].metrics)}} == {"cost"}
     assert scenes["tshirt/punch"].dynamic
-    cells = planned("full:garments", *TESTS, "--scenes", "tshirt/punch").cells
-    assert all(cell.scene.timed for cell in cells)
 
 
 def test_the_reference_comes_first_in_every_scene_and_only_what_has_a_seed_is_repeated():
@@ -55,9 +53,9 @@ def test_the_reference_comes_first_in_every_scene_and_only_what_has_a_seed_is_re
 def test_patterns_choose_scenes_methods_and_cases():
     plan = planned("full:speed,validation,extremes", "--scenes", "*sheet*,free_fall,pend*")
     assert {cell.scene.name for cell in plan.cells} == {"hanging_sheet", "sheet_on_sphere", "free_fall"}
-    known = [case.name for case in plan.cases if case.suite == "validation"]
-    assert known == ["free_fall", "pendulum"]
-    assert [case for case in plan.cases if case.suite == "extremes"] == []
+    assert [(case.name, case.suite) for case in plan.cases] == [
+        ("free_fall", "validation"), ("pendulum", "validation"),
+    ]  # fmt: skip
     assert matching(["a", "ab", "b"], ["a*", "!ab"]) == ["a"] and matching(["a", "b"], ["!b"]) == ["a"]
     assert matching(["w1", "w[1]"], ["w[1]"]) == ["w1", "w[1]"] and matching(["a"], []) == []
 
