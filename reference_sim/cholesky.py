@@ -105,17 +105,10 @@ WIDTH = 4  # numbers a row of right sides: x, y, z and one to fill the lane
 
 
 class ScalarPattern:
-    """Pattern of a symmetric n x n matrix that elements with these stencils add up to.
+    """Pattern of a symmetric n x n matrix that elements with stencils (E, k) add up to; -1 is pinned.
 
-    Args:
-        stencils: (E, k) each, of numbers below n; -1 where a vertex is pinned.
-
-    Attributes:
-        order: (n,) row i of the factor is row order[i] of the matrix.
-        diagonal: (n,) places of its diagonal; row_starts (n + 1,), row_columns and row_places: of the entries
-            left of it.
-        factor_rows (n + 1,), factor_columns: where L has entries left of the diagonal, by rows; starts
-            (n + 1,), rows: the same by columns.
+    Row i of the factor is row order[i] of the matrix. row_starts (n + 1,), row_columns: entries left of
+    its diagonal. factor_rows, factor_columns: those of L, by rows; starts, rows: those by columns.
     """
 
     def __init__(self, count: int, stencils: list[np.ndarray]) -> None:

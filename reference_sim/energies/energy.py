@@ -1,10 +1,8 @@
 """Base class of the physical terms: a definition in torch on one stencil, and its derivatives.
 
-A term states `element_energy` once, in torch. Gradient and Hessian follow from it by automatic
-differentiation; a term may override them with closed-form kernels in its own file, and declare further
-kernels for solvers and training (`Energy.kernels`). The test
-tests/reference_sim/energies/test_derivatives.py holds every override to the default. Torch is imported only
-where the definition is evaluated.
+Gradient and Hessian follow from the definition by automatic differentiation; a term may override them
+with closed-form kernels in its own file, and declare further kernels for solvers and training. The test
+tests/reference_sim/energies/test_derivatives.py holds every override to the default.
 """
 
 from __future__ import annotations
@@ -54,9 +52,6 @@ class Energy:
     """One physical term on one stencil.
 
     Attributes:
-        name: the term's name in tables; a potential has no two terms of one name.
-        cloth: the rest state that the term was built on.
-        stencils: (N, k) vertex indices of each element.
         dynamic: True where the vertices that the term couples change with x, as the pairs of a contact do.
             Such a term has no stencils (N = 0); it gives `sparse_hessian` instead of blocks.
         constant: block sizes (3: Hessian, 1: scalar stiffness) of which the term gives the same at every x
@@ -65,13 +60,12 @@ class Energy:
             judged without preparing the one before it.
         joins_late: whether a step is minimised without the term first, and goes on with it by a way without
             a collision. It is zero wherever nothing is near, so most steps end without it.
-        kernels: functions for fast kernels by use; the uses are listed in kernels.fast_kernels. A subclass
-            does not inherit them.
+        kernels: functions by use, see kernels.fast_kernels. A subclass does not inherit them.
     """
 
-    name: str
-    cloth: Cloth
-    stencils: np.ndarray
+    name: str  # in tables; a potential has no two terms of one name
+    cloth: Cloth  # the rest state that the term was built on
+    stencils: np.ndarray  # (N, k) vertex indices of each element
     dynamic: bool = False
     constant: tuple[int, ...] = ()
     remembers: bool = False

@@ -147,28 +147,21 @@ class Newton:
 
 
 class NewtonRun(Descent):
-    """State of one minimisation by Newton's method.
-
-    Attributes:
-        values: (nnz,) values of the Hessian for the next step.
-        target: relative residual that counts as converged at the last Hessian.
-        projection_level: index into CONVEXITY at the last step.
-        raised: whether that step needed a higher one than it began with.
-        predicting: whether the Hessian takes stresses that the last step predicted.
-        watchdog_steps: of the next watchdog: less after one that came to nothing.
-        residuals: relative residuals since the last factorisation, while that is used again; else none.
-    """
+    """State of one minimisation by Newton's method."""
 
     def __init__(self, newton: Newton, x: np.ndarray, after: Descent | None) -> None:
         super().__init__(newton.potential, x, after=after)
         self.newton, self.hessian = newton, newton.hessian
         self.factorised = False  # whether the last factorisation exists, to solve with
-        self.values, self.target = np.empty(0), newton.tolerance
+        self.values = np.empty(0)  # (nnz,) of the Hessian for the next step
+        self.target = newton.tolerance  # relative residual that counts as converged at the last Hessian
         self.quasi_newton_steps = self.iterations
         self.history = LBFGSHistory(REUSE_MEMORY)
-        self.residuals: list[float] = []
+        self.residuals: list[float] = []  # since the last factorisation, while that is used again
+        # Index into CONVEXITY at the last step, and whether that was higher than the step began with.
         self.projection_level, self.raised = newton.first_level, newton.first_level > 0
-        self.predicting, self.watchdog_steps = False, WATCHDOG_STEPS
+        self.predicting = False  # whether the Hessian takes stresses that the last step predicted
+        self.watchdog_steps = WATCHDOG_STEPS  # of the next one: less after one that came to nothing
 
     def assemble(self, convexity: float) -> np.ndarray:
         """Return values (nnz,) of the Hessian at the point kept last."""
