@@ -11,12 +11,11 @@ import numpy as np
 
 from benchmarks.method import MethodEntry, Reporting
 from benchmarks.methods import METHODS
+from benchmarks.metrics import find_metric
 from benchmarks.results.row import Row
 from benchmarks.results.run_folder import FORMAT, RunFolder
 from reference_sim import Trajectory
-from reports.blocks import Report
 from reports.finished_run import RollOuts, Run, make_run
-from reports.tables import make_tables
 
 TERMS = {"strain": 0.1, "bending": 0.01, "gravity": 0.3, "inertia": 0.004, "collision": 0.02}
 SHOWN = {"simulation": 1.0, "skinning": 9.0, "snug": 2.0, "pbns": 3.0}
@@ -24,18 +23,6 @@ SCENES = ("tshirt/walk", "tshirt/jump")
 FRAMES = 5
 
 DECLARED = {entry.name: entry for entry in METHODS}  # any other is a network of its own
-TABLES = {
-    "energy": "energies", "curvature": "curvature", "cost": "cost", "distance": "penetration",
-    "penetration": "penetration", "gap": "speed", "step": "speed", "gradient": "speed",
-    "roll_out": "extrapolation", "conservation": "conservation", "dynamics": "dynamics", "train": "training",
-}  # fmt: skip
-TITLES = {
-    "gap/energy": "Energy gap",
-    "curvature/error": "Curvature error",
-    "energy/total": "Total",
-    "roll_out/drift": "Drift",
-}
-BETTER_LOWER = ("energy/strain", "energy/total", "curvature/error", "penetration/vertices", "roll_out/drift")
 
 
 def row(scene="tshirt/walk", method="snug", metric="energy/strain", value=1.0, *, seed=0, **more) -> Row:
@@ -60,29 +47,17 @@ def skipped(reason="no body here", **more) -> Row:
 
 def declaration(rows: Sequence[Row], **more) -> dict[str, Any]:
     """Return the content of run.json for these rows."""
-    metrics = {r.metric: r for r in sorted(rows, key=lambda r: r.metric == "energy/total")}
-    cases = {
-        r.scene: {
-            "suite": r.suite, "scene": r.scene, "metric": r.metric, "description": "",
-        }
-        for r in rows
-        if r.metric in ("check", "outcome")
-    }  # fmt: skip
+    names = dict.fromkeys(r.metric for r in sorted(rows, key=lambda r: r.metric == "energy/total"))
+    of_cases = [r for r in rows if r.metric in ("check", "outcome")]
     return {
         "format": FORMAT,
-        "metrics": {
-            name: {
-                "unit": r.unit, "title": TITLES.get(name, name.partition("/")[2].capitalize()),
-                "definition": f"definition of {name}", "table": TABLES.get(name.partition("/")[0], ""),
-                "lower_is_better": True if name in BETTER_LOWER else None,
-                "arbitrary_zero": name in ("energy/gravity", "energy/total"),
-                "of": "machine" if name.startswith("cost/") else "answer",
-            }
-            for name, r in metrics.items()
-        },
+        "metrics": {name: vars(find_metric(name)) for name in names if name not in ("check", "outcome")},
         "methods": {name: {"label": entry.label} for name, entry in DECLARED.items()},
         "scenes": {r.scene: {} for r in sorted(rows, key=lambda r: r.garment != "tshirt") if r.garment},
-        "cases": cases,
+        "cases": {
+            r.scene: {"suite": r.suite, "scene": r.scene, "metric": r.metric, "description": ""}
+            for r in of_cases
+        },
         **more,
     }  # fmt: skip
 
@@ -97,12 +72,6 @@ def run_folder(path: Path, rows: Sequence[Row], **more) -> RunFolder:
     folder.write_rows(rows)
     folder.write_config(declaration(rows, **more))
     return folder
-
-
-def report_of(rows: Sequence[Row], **more) -> Report:
-    """The report of these rows, without pictures."""
-    run = run_of(rows, **more)
-    return Report(run, make_tables(run), {})
 
 
 @dataclass(frozen=True)

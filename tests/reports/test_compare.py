@@ -103,7 +103,7 @@ def test_where_zero_is_a_choice_no_change_hangs_on_it():
 
 def test_repeated_times_count_beyond_15_percent_on_one_machine():
     assert found(rows_of(), rows_of(time=1.15)) == []
-    assert found(rows_of(), rows_of(time=1.25)) == [("changed", "flag", "lbfgs-5", "cost/frame")]
+    assert found(rows_of(), rows_of(time=1.25)) == [("worse", "flag", "lbfgs-5", "cost/frame")]
     assert found(rows_of(), rows_of(time=1.5), times=False) == []
     elsewhere = [dataclasses.replace(r, hardware="another") for r in rows_of(time=1.5)]
     assert found(rows_of(), elsewhere) == []

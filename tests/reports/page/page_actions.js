@@ -78,7 +78,7 @@
     await set('colour', 'curvature');
     found.scale = byId('scale-title').textContent;
     const heads = [...document.querySelectorAll('#scroll thead button')];
-    const last = heads.findIndex((head) => head.textContent.startsWith('Frame'));
+    const last = heads.findIndex((head) => head.textContent.startsWith('Inference'));
     heads[last].click();
     found.up = [document.querySelectorAll('#scroll th')[last].getAttribute('aria-sort'), column(last)];
     heads[last].click();

@@ -60,13 +60,13 @@ def test_a_person_can_use_it(folder, tmp_path):
     assert directions == ("ascending", "descending")
     numbers = [[float(text.strip("×#")) for text in column] for column in columns]
     assert numbers[0] == numbers[1][::-1] == sorted(numbers[0]) and len(set(numbers[0])) == len(METHODS)
-    assert state["definition"] == "Frame: definition of cost/frame."
+    assert state["definition"].startswith("Inference: inference time: run time divided by")
     lines = {kind: text.split("\n") for kind, text in state["copied"].items()}
     count = len(METHODS) + 1
-    assert lines["csv"][0].startswith("Method,Relative excess [%],") and len(lines["csv"]) == count
+    assert lines["csv"][0].startswith("Method,Excess in own energies [%],") and len(lines["csv"]) == count
     assert lines["markdown"][1].startswith("| --- | --- |") and len(lines["markdown"]) == count + 1
-    assert lines["latex"][0] == "\\begin{tabular}{lrrr}" and len(lines["latex"]) == count + 5
-    assert lines["latex"][2].startswith("Method & Relative excess [\\%] & ")
+    assert lines["latex"][0] == "\\begin{tabular}{lrrrrr}" and len(lines["latex"]) == count + 5
+    assert lines["latex"][2].startswith("Method & Excess in own energies [\\%] & ")
     assert state["picture"] == ["tshirt-walk@clip-4.png", "data:image/png;base64,", True]
     assert (
         state["address"].startswith(f"#scene={CLIPS[0]}&methods=simulation,")
