@@ -6,10 +6,9 @@ Vertices of a whole clip are optimised under the training loss, without a networ
     inertia(x_t) = sum_v m_v / (2 dt^2) |x_t - 2 x_{t-1} + x_{t-2}|^2
 
 which a network could reach whose output were not bound to its input. All frames are one cloth of T copies,
-minimised by the L-BFGS of reference_sim on the very terms that judge every method; its preconditioner couples
-no frames. Contact planes are frozen for a round and then searched anew, towards the closest point. The sum is
-not convex: a bound found from skinning, not proven to be the lowest. Its time a frame is that of the whole
-clip divided by its frames.
+minimised by L-BFGS on the very terms that judge every method. Contact planes are frozen for a round and then
+searched anew. The sum is not convex: a bound found from skinning, not proven to be the lowest. Its time a
+frame is that of the whole clip divided by its frames.
 
 The floor of a subspace is the simulation, from its own past and with its own contact planes, whose cloth can
 only do what the subspace expresses: handles, or all that the last layer of a network can give,
@@ -84,13 +83,13 @@ class ClipInertia(Inertia):
 
 
 class DirectOptimisation(Method):
-    """Direct optimisation of one clip. `sums`: minimised sum [J] at the end of each round.
-
-    Raises ValueError for a scene with other terms than the paper's of a garment.
-    """
+    """Direct optimisation of one clip. `sums`: minimised sum [J] at the end of each round."""
 
     def prepare(self, scene: BuiltScene) -> None:
-        """Lay the frames out as one cloth and start from skinning. Raises ValueError for other terms."""
+        """Lay the frames out as one cloth and start from skinning.
+
+        Raises ValueError for a scene with other terms than the paper's of a garment.
+        """
         if _identity(scene.energies) != _identity(declared_energies(scene.cloth)):
             names = ", ".join(term.name for term in scene.energies)
             raise ValueError(
@@ -182,16 +181,15 @@ Space = tuple[np.ndarray, np.ndarray, int]  # U (3 V, K), m (3 V,) [m], sweeps o
 
 @dataclass(kw_only=True)
 class SubspaceFloor(Simulation):
-    """Simulation within a subspace of offsets.
-
-    space: makes the subspace for a dressed body.
-    Raises ValueError for a scene of several steps a frame: there is a pose for its last alone.
-    """
+    """Simulation within the subspace of offsets that `space` makes for a dressed body."""
 
     space: Callable[[DressedBody], Space]
 
     def prepare(self, scene: BuiltScene) -> None:
-        """Pose the subspace in each frame, start from its point nearest to the scene's start, compile."""
+        """Pose the subspace in each frame, start from its point nearest to the scene's start, compile.
+
+        Raises ValueError for a scene of several steps a frame: there is a pose for its last alone.
+        """
         if scene.substeps > 1:
             raise ValueError(f"scene {scene.name} has {scene.substeps} steps a frame, poses are of one")
         assert scene.dressed is not None

@@ -105,7 +105,6 @@ class WarmStarted(Simulation):
 
     guess: name of the network, whose file is `path`, or SKINNING. solver: options of the minimiser that goes
     on from there. residual: whether the last frame's residual is carried.
-    Raises ValueError for a scene of several steps a frame: there is a start for its last alone.
     """
 
     guess: str
@@ -115,7 +114,7 @@ class WarmStarted(Simulation):
     of_guess: Callable[[int], object] = field(init=False)
 
     def prepare(self, scene: BuiltScene) -> None:
-        """Prepare the network or skinning, and the solver that starts from its frames."""
+        """Prepare frames and solver. Raises ValueError for several steps a frame: one alone has a start."""
         if scene.substeps > 1:
             raise ValueError(f"scene {scene.name} has {scene.substeps} steps a frame, starts are of one")
         guess = given_frames(self._frames(scene), self._carry(scene) if self.residual else None)

@@ -194,13 +194,8 @@ def make_plan(
 ) -> Plan:
     """Return the plan of a study: cells, cases, motions and a user's inputs as read.
 
-    Args:
-        study: what is asked.
-        folder: of the run; None: a new one.
-        workers: processes side by side; None: as many as usual.
-        scheduler: address of a cluster; empty: this machine.
-        scenes: further scenes that no file declares.
-        further: other fields of Plan: retry, fresh, command.
+    All else is as of a Plan; without a folder it is a new one, without workers as many as usual. `scenes` are
+    further ones that no file declares.
 
     Raises:
         ValueError: one line for the first thing that cannot be met, with what there is instead. Nothing has

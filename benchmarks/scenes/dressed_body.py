@@ -64,9 +64,7 @@ def build_dressed_body(
 
     cloth = garment.cloth()
     energies = declared_energies(cloth)
-    minimised: tuple[Energy, ...] = ()
-    if scene.self_contact:
-        minimised = with_self_contact(energies)
+    minimised = with_self_contact(energies) if scene.self_contact else ()
     terms = minimised or energies
     warm_up = max(2, min(warm_up_frames, int(SHORT * motion.frames)))
     return worn(

@@ -13,7 +13,6 @@ from benchmarks.scene import BuiltScene, Scene
 from reference_sim.cloth import Cloth, MeshError
 from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.contact_penalty import ContactPenalty
-from reference_sim.energies.energy import Energy
 from reference_sim.energies.gravity import Gravity
 from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.files.mesh_files import METRES, read_mesh, to_metres_y_up
@@ -78,11 +77,11 @@ def build(
             obstacle = Obstacle(to_metres_y_up(stored.obstacle, units=units, up=up), stored.obstacle_faces)
     except MeshError as error:
         raise RollOutFileError(f"{path} with {rest_mesh}: {error}") from None
-    energies: list[Energy] = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)]
+    contact = () if obstacle is None else (ContactPenalty(cloth),)
     return BuiltScene(
         name=scene.name,
         cloth=cloth,
-        energies=(*energies, *([] if obstacle is None else [ContactPenalty(cloth)])),
+        energies=(StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), *contact),
         dt=1.0 / (fps or stored.fps or FPS),
         frames=len(positions),
         settle=lambda: np.ascontiguousarray(positions[0]),
