@@ -51,34 +51,20 @@ class EntryError(ValueError):
 
 @dataclass(frozen=True, kw_only=True)
 class Metadata:
-    """Fields of entry.toml; those with a default may be left out.
-
-    Attributes:
-        title: name for people.
-        authors, description: who, and what in one sentence.
-        url: of code or report, or where in this repository.
-        training_data: what the method has learned from; "none".
-        hardware: of the declared time.
-        protocol: number of the protocol that the roll-outs were made by.
-        milliseconds: a frame, as the authors declare them.
-        seeds: of the trainings; one where roll-outs are files.
-        roll_outs: path of the files below the folder, with {scene}.
-        program: a Python file that declares one method, instead of files (docs/extend.md).
-        scenes: those that the entry covers; all by default.
-    """
+    """Fields of entry.toml; those with a default may be left out."""
 
     title: str
     authors: str
-    description: str
-    url: str
-    training_data: str
-    hardware: str
-    protocol: str
-    milliseconds: float
-    seeds: tuple[int, ...]
-    roll_outs: str = ""
-    program: str = ""
-    scenes: tuple[str, ...] = ()
+    description: str  # one sentence
+    url: str  # of code or report, or where in this repository
+    training_data: str  # what the method has learned from; "none"
+    hardware: str  # of the declared time
+    protocol: str  # number of the one that the roll-outs were made by
+    milliseconds: float  # a frame, as the authors declare them
+    seeds: tuple[int, ...]  # of the trainings; one where roll-outs are files
+    roll_outs: str = ""  # path of the files below the folder, with {scene}
+    program: str = ""  # a Python file that declares one method, instead of files
+    scenes: tuple[str, ...] = ()  # all by default
 
     def __post_init__(self) -> None:
         """Raise ValueError for the first field that cannot be meant."""

@@ -8,8 +8,6 @@
 | `.pc2`, `.pc16` | point cache, as Neural Cloth Simulation writes it; faces of the `.obj` of the same name |
 | folder, pattern | one mesh a frame (`.obj`, `.ply` and others), in the order of the numbers in their names |
 
-Arrays over time have shape (T, V, 3), faces (F, 3); `quasi_static` is the answer to each pose held still.
-
 What a file declares of its size is compared with the file before anything of that size is allocated. Nothing
 is executed. A roll-out that does not fit its scene, in unit, axes, order of vertices, frame rate or place, is
 refused with the remedy: in centimetres it would get numbers, and nobody would see that they mean nothing.
@@ -46,27 +44,16 @@ class RollOutFileError(ValueError):
 
 @dataclass(frozen=True)
 class RollOutOption:
-    """One roll-out, and what its file does not state itself.
+    """One roll-out, and what its file does not state itself."""
 
-    Attributes:
-        name: of the method.
-        path: file, folder or pattern; {scene} stands for the scene's name, its slashes as hyphens.
-        units: of the file.
-        up: vertical axis of the file.
-        fps: frames per second; they have to be the scene's.
-        other_mesh: whether its vertices are those of another mesh of the same garment.
-        ms: declared time of a frame [ms].
-        role: of the method.
-    """
-
-    name: str
-    path: str
+    name: str  # of the method
+    path: str  # of a file, a folder or a pattern, with PLACE
     units: Literal["m", "cm", "mm", "in"] = "m"
     up: Literal["y", "z"] = "y"
-    fps: float | None = None
-    other_mesh: bool = False
-    ms: float | None = None
-    role: str = "external"
+    fps: float | None = None  # they have to be the scene's
+    other_mesh: bool = False  # whether its vertices are those of another mesh of the same garment
+    ms: float | None = None  # declared time of a frame
+    role: str = "external"  # of the method
 
     def __post_init__(self) -> None:
         for what, number in (("fps", self.fps), ("ms", self.ms)):
@@ -112,19 +99,17 @@ KEYS |= {name: name for name in (*OVER_TIME, *FACES, "fps")}
 class StoredRollOut:
     """The contents of a file, in its own unit, axes and order; positions need not be finite.
 
-    positions: (T,V,3) float64. dtype: of the numbers in the file. faces: (F,3). fps [1/s]. obstacle: (T,B,3).
-    obstacle_faces: (G,3). quasi_static: (T,V,3). converged: (T,) whether each frame claims to be. None: the
-    file does not say.
+    None: the file does not say.
     """
 
-    positions: np.ndarray
-    dtype: str = "float64"
-    faces: np.ndarray | None = None
+    positions: np.ndarray  # (T,V,3)
+    dtype: str = "float64"  # of the numbers in the file
+    faces: np.ndarray | None = None  # (F,3)
     fps: float | None = None
-    obstacle: np.ndarray | None = None
-    obstacle_faces: np.ndarray | None = None
-    quasi_static: np.ndarray | None = None
-    converged: np.ndarray | None = None
+    obstacle: np.ndarray | None = None  # (T,B,3)
+    obstacle_faces: np.ndarray | None = None  # (G,3)
+    quasi_static: np.ndarray | None = None  # (T,V,3), the answer to each pose held still
+    converged: np.ndarray | None = None  # (T,) whether each frame claims to be
 
 
 def read_roll_out(path: str | Path) -> StoredRollOut:

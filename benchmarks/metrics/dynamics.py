@@ -111,18 +111,14 @@ def response(moving: Array, static: Array, axes: Array) -> tuple[float, float]:
 
 @dataclass(frozen=True)
 class HemMotion:
-    """Frame of reference of dynamics: the body's root, and the simulator's two answers.
+    """Frame of reference of dynamics: the body's root, and the simulator's two answers."""
 
-    axes: (T,3,3) root to world; origins: (T,3) [m]; hem: vertices (H,); simulated and quasi_static: the
-    simulator's positions (T,V,3) [m], world; first: frame that is judged.
-    """
-
-    axes: Array
-    origins: Array
-    hem: Array
-    simulated: Array
-    quasi_static: Array
-    first: int = 0
+    axes: Array  # (T,3,3) root to world
+    origins: Array  # (T,3) [m]
+    hem: Array  # (H,) vertices
+    simulated: Array  # (T,V,3) [m], world
+    quasi_static: Array  # (T,V,3) [m], world
+    first: int = 0  # frame that is judged
 
     def of(self, positions: Array) -> Array:
         """Return the hem (T,H,3) [m] of positions (T,V,3) [m] in the axes of the root."""

@@ -17,10 +17,6 @@ found from x_t, the one that lies below the frame. Over the judged frames
 x_s is the garment skinned to the frame's pose or, where there is no body, the guess x_0. The scale is the
 same for every method of a scene. Each method is judged from its own history, which a chaotic roll-out cannot
 blur: a small gap says that a step was solved, not that the past was right; it does not measure dynamics.
-
-All judged frames are looked at or, of more than the preset's `gap_samples`, as many, evenly spread, as
-bring the standard error of the gap below PRECISION of it, or below NEGLIGIBLE of the scale; that error is the
-uncertainty of its row. Planes are frozen at the frame in the first `gap_samples` of them.
 """
 
 from __future__ import annotations
@@ -95,15 +91,11 @@ def gap_scale(group: SceneRollOuts) -> float | None:
 
 @dataclass
 class Optimality:
-    """Numbers of the sampled frames, of `judged` in all.
-
-    values: of each of MEANS, gap/refrozen at the first of these frames alone. away: frame -> (V,) [mm] from
-    y_t.
-    """
+    """Numbers of the sampled frames, of `judged` in all; gap/refrozen is of the first of them alone."""
 
     judged: int = 0
     values: dict[str, list[float]] = field(default_factory=lambda: {name: [] for name in MEANS})
-    away: dict[int, Floats] = field(default_factory=dict)
+    away: dict[int, Floats] = field(default_factory=dict)  # frame -> (V,) [mm] from y_t
 
     def estimate(self, values: list[float]) -> Estimate:
         """Return the mean and its standard error as a sample of the judged frames; 0 for all of them."""
@@ -129,7 +121,7 @@ class Optimality:
 def optimality(
     scene: BuiltScene, positions: Positions, *, samples: int, scale: float | None = None
 ) -> Optimality:
-    """Solve the time steps of at least `samples` frames again, until the gap is precise, and compare.
+    """Solve the time steps of at least `samples` frames again, evenly spread, until the gap is precise.
 
     scale: [J] of the scene's gaps. All numbers are nan where a frame has no finite energy.
     """

@@ -62,20 +62,13 @@ def integrated_elastica(
 
 @dataclass(frozen=True)
 class Strip:
-    """Horizontal strip along x, clamped near x = 0.
-
-    Attributes:
-        cloth: rest state.
-        cell, width: [m].
-        stiffness: plate stiffness D [J] of its hinges.
-        clamp: x [m] where the clamp acts.
-    """
+    """Horizontal strip along x, clamped near x = 0."""
 
     cloth: sim.Cloth
-    cell: float
-    width: float
-    stiffness: float
-    clamp: float
+    cell: float  # [m]
+    width: float  # [m]
+    stiffness: float  # [J] plate stiffness D of its hinges
+    clamp: float  # [m] x where the clamp acts
 
     @property
     def tip(self) -> np.ndarray:

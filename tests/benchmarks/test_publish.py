@@ -57,24 +57,22 @@ def test_a_run_that_fails_or_is_of_another_commit_is_left(tmp_path, monkeypatch,
     assert not (tmp_path / "kept").exists()
 
 
-@pytest.mark.parametrize(
-    "suite, status, config, usable",
-    [
-        ("garments", "stalled", {"finished": "now"}, True),
-        ("garments", "diverged", {"finished": "now"}, False),
-        ("garments", "ok", {"finished": None}, False),
-        ("garments", "ok", {"finished": "now", "tasks": {"training": {"snug": {"failed": "?"}}}}, False),
-    ],
-)
+FAILED = {"tasks": {"training": {"snug": {"failed": "?"}}}}
+
+
+@pytest.mark.parametrize("status, finished, more, usable", [
+    ("stalled", "now", {}, True), ("diverged", "now", {}, False), ("ok", None, {}, False),
+    ("ok", "now", FAILED, False),
+])  # fmt: skip
 def test_a_run_counts_where_it_ended_and_simulations_stalled_at_worst(
-    tmp_path, suite, status, config, usable
+    tmp_path, status, finished, more, usable
 ):
     """benchmarks.run ends with status 1 for a stalled simulation, whose numbers count."""
     folder, reason = RunFolder(tmp_path), "why" * (status != "ok")
     assert not all_usable(folder)  # no rows yet
-    what = (suite, "tshirt/kick", "simulation", 0, "energy/total", "J")
+    what = ("garments", "tshirt/kick", "simulation", 0, "energy/total", "J")
     folder.write_rows([Row(*what, status=status, reason=reason, value=1.0)])
-    folder.write_config(config)
+    folder.write_config({"finished": finished} | more)
     assert all_usable(folder) == usable
 
 
