@@ -57,7 +57,7 @@ def test_a_pinned_sheet_in_other_units_and_axes_is_the_same(simulate):
         ("sheet.obj --pins 49 -o a.vtkhdf", "--pins '49': give 'top', or vertices from 0 to 48 as '0,9'"),
         ("sheet.obj -o a.obj", "a.obj: name a new file that ends in .vtkhdf, in a folder that exists"),
         ("sheet.obj --obstacle ball --obstacle-rest sheet.obj -o a.vtkhdf", "export both from one mesh"),
-        ("sheet.obj --obstacle sheet.obj -o a.vtkhdf", "sheet.obj: "),
+        ("sheet.obj --obstacle sheet.obj -o a.vtkhdf", "sheet.obj: obstacle is not closed"),
     ],
 )  # fmt: skip
 def test_bad_input_ends_in_one_line_and_writes_nothing(simulate, capsys, tmp_path, words, message):
