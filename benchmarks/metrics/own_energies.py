@@ -14,12 +14,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from benchmarks.methods.own_energies import (
-    STATIC,
-    is_own_reference,
-    own_energies,
-    own_reference,
-)
+from benchmarks.methods.own_energies import STATIC, is_own_reference, own_energies, own_reference
 from benchmarks.metric import Measurements, metrics_of
 from benchmarks.metrics.energy import energies, energy_series
 from benchmarks.results.row import USABLE

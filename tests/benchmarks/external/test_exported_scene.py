@@ -91,10 +91,8 @@ def rows_beside(scene, entry) -> dict:
 
 def test_skinning_made_elsewhere_and_scored_gives_the_numbers_of_the_method(home, tmp_path):
     folder, scene = home
-    expected, inside = (
-        rows_beside(scene, find_method("skinning")),
-        prepared("skinning", scene).run().positions,
-    )
+    expected = rows_beside(scene, find_method("skinning"))
+    inside = prepared("skinning", scene).run().positions
 
     def rows_of_file(**arrays) -> dict:
         np.savez(tmp_path / "mine.npz", **arrays)

@@ -61,9 +61,7 @@ def test_a_saddle_called_converged_is_found():
 
 def test_a_saddle_far_below_the_stiffness_of_the_membrane_is_found():
     """A flat sheet pressed by a hair: the curvature that makes it buckle is far below the membrane's own."""
-    potential, guess = sheet_step(
-        gravity=0.0, speed=0.0, start="flat", dt=None, bending=2e-5, pins="side"
-    )  # fmt: skip
+    potential, guess = sheet_step(gravity=0.0, speed=0.0, start="flat", dt=None, bending=2e-5, pins="side")
     flat = np.where(potential.cloth.free[:, None], guess * [0.99999, 1.0, 0.99999], guess)
     truth = optimality_of(potential, flat)
     assert -1e-2 < truth.lowest_curvature < -truth.zero_curvature
