@@ -21,6 +21,7 @@ TERMS = {"strain": 0.1, "bending": 0.01, "gravity": 0.3, "inertia": 0.004, "coll
 SHOWN = {"simulation": 1.0, "skinning": 9.0, "snug": 2.0, "pbns": 3.0}
 SCENES = ("tshirt/walk", "tshirt/jump")
 FRAMES = 5
+OF_CASES = ("check", "outcome")
 
 DECLARED = {entry.name: entry for entry in METHODS}  # any other is a network of its own
 
@@ -48,16 +49,12 @@ def skipped(reason="no body here", **more) -> Row:
 def declaration(rows: Sequence[Row], **more) -> dict[str, Any]:
     """Return the content of run.json for these rows."""
     names = dict.fromkeys(r.metric for r in sorted(rows, key=lambda r: r.metric == "energy/total"))
-    of_cases = [r for r in rows if r.metric in ("check", "outcome")]
     return {
         "format": FORMAT,
-        "metrics": {name: vars(find_metric(name)) for name in names if name not in ("check", "outcome")},
+        "metrics": {name: vars(find_metric(name)) for name in names if name not in OF_CASES},
         "methods": {name: {"label": entry.label} for name, entry in DECLARED.items()},
         "scenes": {r.scene: {} for r in sorted(rows, key=lambda r: r.garment != "tshirt") if r.garment},
-        "cases": {
-            r.scene: {"suite": r.suite, "scene": r.scene, "metric": r.metric, "description": ""}
-            for r in of_cases
-        },
+        "cases": {r.scene: {"scene": r.scene, "metric": r.metric} for r in rows if r.metric in OF_CASES},
         **more,
     }  # fmt: skip
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import json
 import re
 
@@ -20,21 +19,16 @@ NASTY = "</script><script>window.hacked=1</script>"
 
 
 def write_run(path, totals, scenes, protocol, **config):
-    rows = []
-    for scene in scenes:
-        for name, total in (TOTAL | totals).items():
-            numbers = {"energy/total": total, "penetration/surface": 0.5, "cost/frame": 2.0}
-            rows += [
-                dataclasses.replace(
-                    row(scene, name, metric, value),
-                    protocol=protocol,
-                    reason=DECLARED if metric == "cost/frame" and "metadata" in config else "",
-                )
-                for metric, value in numbers.items()
-            ]
+    numbers = {"penetration/surface": 0.5, "cost/frame": 2.0}
+    reasons = {"cost/frame": DECLARED} if "metadata" in config else {}
+    rows = [
+        row(scene, name, metric, value, protocol=protocol, reason=reasons.get(metric, ""))
+        for scene in scenes
+        for name, total in (TOTAL | totals).items()
+        for metric, value in {"energy/total": total, **numbers}.items()
+    ]
     path.mkdir(parents=True)
-    folder = run_folder(path, rows, **config)
-    return read_run(folder)
+    return read_run(run_folder(path, rows, **config))
 
 
 @pytest.fixture

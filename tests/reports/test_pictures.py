@@ -163,10 +163,7 @@ def test_all_cloths_are_in_sight_of_one_camera_in_every_frame():
 @pytest.mark.parametrize(
     ("change", "hint"),
     [
-        (
-            ["--methods", "snug,simulatoin"],
-            "no roll-out of 'simulatoin' in tshirt/walk: scenes",
-        ),
+        (["--methods", "snug,simulatoin"], "no roll-out of 'simulatoin' in tshirt/walk: scenes"),
         (["-o", "x.avi"], "x.avi: a film ends in .gif, point caches in .pc2"),
         (["--speed", "0"], "--speed is 0.01 to 10"),
         (["--width", "7"], "--width 64 to 2000"),

@@ -11,7 +11,6 @@ from benchmarks.results.row import COLUMNS
 from reports.docs import documents, main
 from reports.statistics.effects import EXCESS, Effect
 from reports.statistics.means_and_spreads import Mean
-from reports.tables import make_tables
 from reports.tables.table import METHOD, Column, Table
 from reports.text.published_parts import (
     BEGIN,
@@ -21,7 +20,7 @@ from reports.text.published_parts import (
     fill,
     published_part,
 )
-from reports.text.text_table import answer, remarks_on, text_rows
+from reports.text.text_table import remarks_on, text_rows
 from snug.body.smpl_files import SYNONYMS
 from snug.motion.files import ARRAY_NAMES
 from tests.reports.report_folder import row, run_of
@@ -48,21 +47,6 @@ def test_a_mean_over_fewer_roll_outs_is_marked_and_the_mark_explained():
     rows = text_rows(RUN, fewer)
     assert rows[1] == ["SNUG", "0.250*"]
     assert remarks_on(rows).startswith("* A mean over fewer") and remarks_on(rows[:1]) == ""
-
-
-def test_the_answer_is_a_table_and_one_line_below():
-    totals = {"simulation": 1.0, "skinning": 9.0, "snug": 2.0, "pbns": 3.0}
-    rows = [
-        row(scene, method, "energy/total", value * size)
-        for scene, size in (("tshirt/a", 1.0), ("tshirt/b", 2.0), ("tshirt/c", 3.0))
-        for method, value in totals.items()
-    ]
-    run = run_of(rows)
-    head, *lines, last = answer(run, make_tables(run)).splitlines()
-    assert head.split()[:3] == ["Method", "Relative", "excess"] and len(lines) == len(totals)
-    assert last.startswith(
-        "On 3 unseen motions the relative excess is: SNUG 12 % (pooled 12 %) and PBNS 25 %"
-    )
 
 
 def test_the_table_of_a_class_has_each_of_its_fields_once():

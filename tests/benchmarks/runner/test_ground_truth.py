@@ -108,9 +108,8 @@ def test_a_clip_is_simulated_as_its_motion_would_be(tmp_path):
         start=scene.start, method="lbfgs", max_iterations=5, finish=False,
     )  # fmt: skip
     positions = read_arrays(tmp_path / outcome.files[0])[clip.name]
-    assert (
-        np.array_equal(positions, trajectory.positions.astype(np.float32)) and len(positions) == CLIP_FRAMES
-    )
+    assert np.array_equal(positions, trajectory.positions.astype(np.float32))
+    assert len(positions) == CLIP_FRAMES
 
 
 def test_a_network_learns_from_given_motions_and_from_the_clips_that_are_there(tmp_path, quickly):

@@ -68,8 +68,6 @@ def test_a_person_can_use_it(folder, tmp_path):
     assert lines["latex"][0] == "\\begin{tabular}{lrrrrr}" and len(lines["latex"]) == count + 5
     assert lines["latex"][2].startswith("Method & Excess in own energies [\\%] & ")
     assert state["picture"] == ["tshirt-walk@clip-4.png", "data:image/png;base64,", True]
-    assert (
-        state["address"].startswith(f"#scene={CLIPS[0]}&methods=simulation,")
-        and "colour=curvature" in state["address"]
-    )
+    assert state["address"].startswith(f"#scene={CLIPS[0]}&methods=simulation,")
+    assert "colour=curvature" in state["address"]
     assert state["scene"] == WHOLE and len(state["panesThere"]) == 4 and state["curves"] == 4

@@ -7,12 +7,7 @@ import pytest
 import torch
 
 from snug.networks.garment_network import make_network
-from snug.networks.roll_out import (
-    RollOutError,
-    prepare_frame_inputs,
-    prepare_frames,
-    roll_out,
-)
+from snug.networks.roll_out import RollOutError, prepare_frame_inputs, prepare_frames, roll_out
 from snug.networks.trained_model import TrainedModel
 from snug.recipe import DEFAULT
 from snug.training.train_network import untrained_model
@@ -32,10 +27,8 @@ def test_what_came_before_a_motion_is_known_to_inputs_and_state(kind):
         assert np.abs(np.array(list(begin())) - whole).max() < 1e-6
     forgetful = np.array(list(prepare_frames(model, dressed, rest)()))
     assert kind == "pbns" or np.abs(forgetful - whole).max() > 1e-5
-    make, known = (
-        prepare_frame_inputs(model, dressed, motion),
-        prepare_frame_inputs(model, dressed, rest, earlier=before),
-    )
+    make = prepare_frame_inputs(model, dressed, motion)
+    known = prepare_frame_inputs(model, dressed, rest, earlier=before)
     assert torch.allclose(known(0)[0], make(5)[0], atol=1e-6)
 
 
