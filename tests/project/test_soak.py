@@ -10,11 +10,9 @@ import pytest
 
 from reference_sim import Cloth, Obstacle, simulate
 from reference_sim.energies import BendHinge, ContactFriction, ContactPenalty, Gravity, StretchStVK
-from snug.recipe import DEFAULT
 from snug.training.checkpoint import Checkpoint
-from snug.training.train_network import train_network
 from tests.reference_sim.meshes import grid, sphere
-from tests.snug.training.dressing import swaying, tube_dress
+from tests.snug.training.dressing import PLAIN, short, swaying
 
 STATUS = Path("/proc/self/status")
 needs_proc = pytest.mark.skipif(not STATUS.exists(), reason="memory is read from /proc")
@@ -66,9 +64,8 @@ def test_a_simulation_of_many_frames_keeps_the_frames_alone():
 
 def test_a_training_of_many_steps_keeps_its_history_alone(tmp_path):
     samples: list[tuple[int, int]] = []
-    train_network(
-        "snug", tube_dress(), [swaying(60)], steps=STEPS, seed=0, progress=False, every=400,
-        recipe=replace(DEFAULT, mixed=0.0, batch=4),
+    short(
+        motions=[swaying(60)], steps=STEPS, every=400, recipe=replace(PLAIN, batch=4),
         checkpoint=Checkpoint(path=tmp_path / "checkpoint.safetensors", minutes=0.1),
         log=lambda row: samples.append((int(row["step"]), own_memory())),
     )  # fmt: skip
