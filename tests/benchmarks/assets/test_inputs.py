@@ -1,4 +1,4 @@
-"""Files of a user; motions that cannot take part are refused."""
+"""A user's files are known again by what was read, and motions that cannot take part are refused."""
 
 from __future__ import annotations
 
@@ -26,6 +26,12 @@ def write_body(path: Path, scale: float = 1.0) -> str:
     scaled = {name: scale * array for name, array in arrays.items()}
     np.savez(path, f=body.faces, weights=body.skinning_weights, kintree_table=table, **scaled)
     return str(path)
+
+
+def test_digests_are_of_what_was_read(tmp_path):
+    one, same, other = (write_body(tmp_path / f"{n}.npz", scale) for n, scale in enumerate((1.0, 1.0, 1.1)))
+    first, second, third = (read_inputs(body=Path(file)).body.digest for file in (one, same, other))
+    assert first == second != third
 
 
 @pytest.mark.parametrize(
