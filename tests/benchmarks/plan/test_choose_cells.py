@@ -10,6 +10,7 @@ from benchmarks.metrics import measured_in
 from benchmarks.plan.choose_cells import expanded, matching
 from benchmarks.plan.motions import Motions, split_motions
 from benchmarks.plan.plan import make_plan
+from benchmarks.plan.study import read_study
 from benchmarks.presets import find_preset
 from benchmarks.scenes import GARMENT_SCENES
 from snug.motion.library import DYNAMIC_TEST
@@ -101,7 +102,6 @@ def test_motions_are_divided_as_help_says():
     assert set(moved.test) == {"walk", "kick"} and "kick" not in moved.validation
     assert not {"walk", *VALIDATION, *TEST} & set(moved.train)
     assert not {"05_02_b", "05_02_c"} & set(divided(test_motions=["05_02_a"]).validation)
-    assert divided(split="validation").measured == VALIDATION[:8]  # by which recipes are chosen
     other = divided(validation_motions="bow", split="validation")
     assert (other.test, other.measured) == (TEST, ("bow",)) and not {"bow", *TEST} & set(other.train)
     small = divided(sizes="smoke")
@@ -118,4 +118,14 @@ def test_motions_are_divided_as_help_says():
     # A user's files of clips whose parts are measured do not train, nor does the library's.
     motions = divided(["01_01", "05_02", "05_12", "a"], motions="library")
     assert motions.train[:2] == ("05_12", "a") and not {"01_01", "05_02"} & set(motions.train)
+    assert "05_12" not in divided(["05_12"]).train
     assert "05_04" not in divided(test_motions=["01_01", "05_04"]).train
+
+
+def test_a_recipe_is_never_chosen_by_the_test_motions():
+    from snug.motion.library import TEST, VALIDATION
+
+    ablations = read_study("ablations")
+    assert ablations.split == "validation" and not ablations.test_motions
+    motions = split_motions(ablations)
+    assert motions.measured == VALIDATION[:8] and not set(TEST) & {*motions.measured, *motions.train}
