@@ -1,6 +1,7 @@
 """Scenes x methods: how accurate each method is, and at what cost. Run `python -m benchmarks.run --help`.
 
-What a user's file declares (docs/extend.md) is imported from here. Nothing heavy is loaded before it is used.
+What a user's file declares (docs/extend.md) is imported from here. Nothing heavy is loaded before it is
+used.
 
 >>> from benchmarks import MethodEntry, Scene
 >>> Scene(name="curtain", description="a curtain").dressed

@@ -69,8 +69,8 @@ def read_inputs(
     """Read a user's files: body, a mesh made for it, motions but for "library".
 
     Raises:
-        ValueError: one line with file and remedy: BodyError, GarmentError, MotionError, or InputError for a
-            motion that is too short or has the name of another.
+        ValueError: one line with file and remedy: BodyError, GarmentError, MotionError, or InputError for
+            a motion that is too short or has the name of another.
 
     >>> read_inputs().garment is None
     True
@@ -161,7 +161,8 @@ def open_assets(
 ) -> Assets:
     """Tailor these garments to the body, but for the user's, and cut motions to the preset's lengths.
 
-    Those named in `training` have another length. Raises ValueError for a garment that cannot be tailored.
+    Those named in `training` have another length. Raises ValueError for a garment that cannot be
+    tailored.
 
     >>> assets = open_assets(find_preset("smoke"), embedded_motions(["walk"]), ["tshirt"])  # doctest: +SKIP
     """

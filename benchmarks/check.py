@@ -95,14 +95,16 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def plan_of(path: str, study: Study, folder: Path) -> Plan:
     """Return the plan of all that a file declares: methods in tiny scenes, its scenes and metrics simulated.
 
-    Scenes that the study names take the place of the tiny ones; methods alone meet them. Raises ValueError
-    where a run with the file would raise too, and for a file that declares nothing.
+    Scenes that the study names take the place of the tiny ones; methods alone meet them. Raises
+    ValueError where a run with the file would raise too, and for a file that declares nothing.
     """
     module = user_files.import_file(user_files.file_of(path))
     wanted = user_files.KINDS[:1] if study.scenes else user_files.KINDS
     declared = [kind.word for kind in wanted if hasattr(module, kind.tuple_name)]
     if not declared:
-        raise DeclarationError(f"{path}: declares none of {', '.join(kind.tuple_name for kind in wanted)}")
+        raise DeclarationError(
+            f"{path}: declares none of {', '.join(kind.tuple_name for kind in wanted)}"
+        )
     simulation = ("simulation",)
     parts = {
         "methods": Part(question="?", scenes=study.scenes or SCENES_OF_METHODS, methods=(path,)),
@@ -238,7 +240,9 @@ def distance(one: np.ndarray, other: np.ndarray) -> float:
 def fingerprints(scene: BuiltScene) -> dict[str, str]:
     """Return name -> digest of the arrays of a scene, which nobody may alter."""
     whole: Any = scene
-    values = {name: reduce(lambda of, a: getattr(of, a, None), name.split("."), whole) for name in UNALTERED}
+    values = {
+        name: reduce(lambda of, a: getattr(of, a, None), name.split("."), whole) for name in UNALTERED
+    }
     return {name: digest(np.asarray(value)) for name, value in values.items() if value is not None}
 
 
@@ -274,15 +278,22 @@ def check_derivatives(energy: Energy, scene: BuiltScene) -> None:
     value, gradient = energy.value_and_gradient(x)
     what = f"energy {energy.name}: its"
     finite = np.isfinite(value) and np.shape(gradient) == x.shape and np.isfinite(gradient).all()
-    demand((finite, f"{what} value {value} and gradient {np.shape(gradient)}: give finite ones {x.shape}"))
+    demand(
+        (finite, f"{what} value {value} and gradient {np.shape(gradient)}: give finite ones {x.shape}")
+    )
     moved = np.abs(gradient).max(axis=1) > 0.0  # elsewhere any direction says the same
     for _ in range(DIRECTIONS):
         direction = random.standard_normal(x.shape) * (moved[:, None] if moved.any() else 1.0)
         ahead, behind = (
             energy.value_and_gradient(x + sign * DIFFERENCE_STEP * direction) for sign in (1.0, -1.0)
         )
-        slope, stated = (ahead[0] - behind[0]) / (2.0 * DIFFERENCE_STEP), float((gradient * direction).sum())
-        near = DERIVATIVE_TOLERANCE * np.linalg.norm(gradient) + SUM_ROUND_OFF * abs(value) / DIFFERENCE_STEP
+        slope, stated = (
+            (ahead[0] - behind[0]) / (2.0 * DIFFERENCE_STEP),
+            float((gradient * direction).sum()),
+        )
+        near = (
+            DERIVATIVE_TOLERANCE * np.linalg.norm(gradient) + SUM_ROUND_OFF * abs(value) / DIFFERENCE_STEP
+        )
         demand((abs(slope - stated) <= near, f"{what} gradient is not the derivative of its value: "
             f"{stated:.6g} N along a direction, differences say {slope:.6g} N"))  # fmt: skip
     turned = (ahead[1] - behind[1]) / (2.0 * DIFFERENCE_STEP)

@@ -42,7 +42,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     add = parser.add_argument
     add("scene", metavar="SCENE", help="as in benchmarks.run --list, or GARMENT/training-motions")
-    add("-o", "--out", required=True, metavar="DIR", help="a new or empty folder; of training motions a file")
+    add(
+        "-o",
+        "--out",
+        required=True,
+        metavar="DIR",
+        help="a new or empty folder; of training motions a file",
+    )
     add("--reference", action="store_true", help="simulate the scene, and write the trajectory too")
     add_study_options(parser)
     options = parser.parse_args(arguments)

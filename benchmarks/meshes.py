@@ -40,7 +40,9 @@ def right_grid(rows: int, columns: int, height: float, width: float) -> tuple[np
     >>> points.shape, len(faces)
     ((6, 2), 4)
     """
-    y, x = np.meshgrid(np.linspace(0, height, rows + 1), np.linspace(0, width, columns + 1), indexing="ij")
+    y, x = np.meshgrid(
+        np.linspace(0, height, rows + 1), np.linspace(0, width, columns + 1), indexing="ij"
+    )
     a, b, c, d = _corners(rows, columns)
     faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
     return np.stack([x.ravel(), y.ravel()], 1), faces
@@ -111,7 +113,9 @@ def torus(cells: int, major: float, minor: float) -> tuple[np.ndarray, np.ndarra
     i, j = np.meshgrid(np.arange(2 * cells), np.arange(cells), indexing="ij")
     after, beside = (i + 1) % (2 * cells), (j + 1) % cells
     a, b, c, d = (p * cells + q for p, q in ((i, j), (after, j), (after, beside), (i, beside)))
-    faces = np.concatenate([np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)])
+    faces = np.concatenate(
+        [np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)]
+    )
     return points, faces, ((major + minor * np.cos(v) + minor * np.cos(v)) / (2 * minor * ring)).ravel()
 
 
@@ -121,9 +125,9 @@ def rectangle(
     """Return [0, length] x [0, width] in `columns` x `rows` cells: points (V,2) [m], faces (F,3).
 
     The families of triangles: right, all diagonals alike; cross, both diagonals; union_jack, diagonals
-    alternate; equilateral, columns shifted by half a cell in turn (truly equilateral if cells are 1 by ROW);
-    delaunay, inner vertices moved by up to 0.3 cells. The first two columns are regular in all, so that a
-    clamp means the same. Raises ValueError for an unknown family.
+    alternate; equilateral, columns shifted by half a cell in turn (truly equilateral if cells are 1 by
+    ROW); delaunay, inner vertices moved by up to 0.3 cells. The first two columns are regular in all, so
+    that a clamp means the same. Raises ValueError for an unknown family.
     """
     points, faces = right_grid(rows, columns, width, length)
     cell = np.array([length / columns, width / rows])
@@ -226,12 +230,16 @@ def sphere(radius: float, cells: int) -> tuple[np.ndarray, np.ndarray]:
     ticks = np.tan(np.linspace(-np.pi / 4, np.pi / 4, cells + 1))
     u, v = np.meshgrid(ticks, ticks, indexing="ij")
     one = np.ones_like(u)
-    sides = [np.roll(np.stack([one * s, u, v * s], -1), k, axis=-1) for k in range(3) for s in (-1.0, 1.0)]
+    sides = [
+        np.roll(np.stack([one * s, u, v * s], -1), k, axis=-1) for k in range(3) for s in (-1.0, 1.0)
+    ]
     points = np.concatenate([side.reshape(-1, 3) for side in sides])
     a, d, c, b = _corners(cells, cells)
     square = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
     faces = np.concatenate([square + k * (cells + 1) ** 2 for k in range(6)])
     # Points on the cube's edges were made once for each side: keep one of each.
-    _, first, inverse = np.unique(np.round(points, 12) + 0.0, axis=0, return_index=True, return_inverse=True)
+    _, first, inverse = np.unique(
+        np.round(points, 12) + 0.0, axis=0, return_index=True, return_inverse=True
+    )
     points, faces = points[first], inverse.ravel()[faces]
     return radius * points / np.linalg.norm(points, axis=1, keepdims=True), faces

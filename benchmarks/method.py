@@ -74,8 +74,8 @@ class WorkerDied(RuntimeError):
 class Method:
     """Interface of a method; one object serves one cell. Derive from it, or write the same names.
 
-    The harness owns the clock: it times the whole of run(), and inputs() by the same clock. What a method may
-    add are the times of its frames, as `frame_seconds` of the trajectory.
+    The harness owns the clock: it times the whole of run(), and inputs() by the same clock. What a method
+    may add are the times of its frames, as `frame_seconds` of the trajectory.
     """
 
     def prepare(self, scene: BuiltScene) -> None:
@@ -85,7 +85,8 @@ class Method:
     def run(self) -> Trajectory:
         """Compute the roll-out, frame by frame. Timed. Failure is a status in it, not an exception.
 
-        Short ones are called again until enough time is measured: each does all of the work, from the start.
+        Short ones are called again until enough time is measured: each does all of the work, from the
+        start.
         """
         raise NotImplementedError
 
@@ -126,7 +127,8 @@ class Reporting:
     """Place of a method among others in reports: curves, comparisons and pairing of seeds.
 
     Attributes:
-        family: methods of one curve, which differ in effort alone; the method's own name where it is empty.
+        family: methods of one curve, which differ in effort alone; the method's own name where it is
+            empty.
         level: place on that curve, as a number of iterations or a tolerance.
         base: name of the method that this one is compared with.
         pairing_group: shared by methods that are compared seed by seed.
@@ -153,7 +155,8 @@ class MethodEntry:
         files: what it reads, such as weights, as paths relative to that file; a change makes its results
             stale.
         options: what make() gets besides models and seed.
-        needs_body: whether it works on dressed bodies alone: `scene.dressed` has body, garment and motion.
+        needs_body: whether it works on dressed bodies alone: `scene.dressed` has body, garment and
+            motion.
         trained: name of the network that it needs, if any.
         training: how that is trained, where benchmarks.methods.declared_networks does not have it.
         seeded: whether another seed gives another answer; if not, it runs once whatever the seeds.
@@ -162,18 +165,20 @@ class MethodEntry:
         needs_no_obstacle: whether it knows no contact.
         package: what it needs installed besides this project.
         batched: whether it has `batch(copies)`, which computes many bodies at once.
-        gives_first_frame: whether it computes frame 0 too, as networks do; other methods are given the start.
+        gives_first_frame: whether it computes frame 0 too, as networks do; other methods are given the
+            start.
         timed: whether its run time is measured in scenes that measure run times.
-        declared_ms: [ms] a frame, as its author says, where no clock of ours can measure it; provenance of a
-            trajectory may say it as well.
-        other_mesh: whether its vertices and triangles are not the scene's: then only surfaces are compared.
-        static_known: False of a solver whose quasi-static solution is not the simulation's, and that does not
-            return it either.
+        declared_ms: [ms] a frame, as its author says, where no clock of ours can measure it; provenance
+            of a trajectory may say it as well.
+        other_mesh: whether its vertices and triangles are not the scene's: then only surfaces are
+            compared.
+        static_known: False of a solver whose quasi-static solution is not the simulation's, and that does
+            not return it either.
         left_out: reason why it is not run; empty where it runs.
         role: its place in tables and plots: `solver`, `warm-started`, `network`, `ablation`, `baseline`,
             `external`, or another of benchmarks.results.row.ROLES.
-        reporting: a Reporting, which joins the members of a family by a line and names the method to compare
-            with; for reports alone.
+        reporting: a Reporting, which joins the members of a family by a line and names the method to
+            compare with; for reports alone.
 
     Raises:
         DeclarationError: an unknown role.

@@ -55,8 +55,8 @@ class Metric:
         definition: one line for the report.
         table: the table that has this column, or empty.
         lower_is_better: None where neither is.
-        arbitrary_zero: whether its zero is a choice, as the height of a potential energy: then differences
-            say something, and ratios nothing.
+        arbitrary_zero: whether its zero is a choice, as the height of a potential energy: then
+            differences say something, and ratios nothing.
         of: what it is a number of: the "answer" of a method; the "method" itself, as its size; or the
             "machine", as every time. Another seed gives another answer; another machine another time.
         declared_in: as of a MethodEntry.
@@ -115,8 +115,8 @@ class Measurements:
         metrics: all that the functions give a number of.
         measure: of a roll-out, name -> value; what does not apply is left out.
         compare: of a roll-out and the reference, name -> value. It is called with each member of the
-            reference's ensemble too (benchmarks.results.protocol): the standard deviation over them is the
-            uncertainty of a number.
+            reference's ensemble too (benchmarks.results.protocol): the standard deviation over them is
+            the uncertainty of a number.
         series: of a roll-out, curves beside the trajectory, name -> (T,), or (T,V) of every vertex.
         judge: of a roll-out and its values, status and reason where it failed though it ended well.
         where_named: whether only scenes that name it are measured.

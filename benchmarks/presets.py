@@ -25,16 +25,17 @@ class Dependence:
 class Preset:
     """The sizes of one run. `None` for a number of motions means all of them.
 
-    frames: at most so many frames of each motion that is measured, at 30 per second, and train_frames of each
-    that trains; clip_frames: of its liveliest part;
-    warm_up_frames: at the beginning of a dressed scene, simulated and not evaluated, before those of a clip;
-    loop_frames: of the walk in a loop.
-    steps: optimiser steps per kind of network, or per training. settle_frames: frames from the T-pose into
-    the first pose of a motion. sheet_cells: the small scenes are sheets of so many cells along each side.
-    gap_samples: frames of a trajectory, at least, at which part speed solves the step again to know the gap
-    to its minimum. least_seconds [s]: of run time to be measured of each timed cell, whose short run is done
-    again until then. repeats: times that a cell of part speed is run, those whose first run took at most
-    repeat_seconds [s]. cell_seconds: time after which the process of a cell is ended [s].
+    frames: at most so many frames of each motion that is measured, at 30 per second, and train_frames of
+    each that trains; clip_frames: of its liveliest part;
+    warm_up_frames: at the beginning of a dressed scene, simulated and not evaluated, before those of a
+    clip; loop_frames: of the walk in a loop.
+    steps: optimiser steps per kind of network, or per training. settle_frames: frames from the T-pose
+    into the first pose of a motion. sheet_cells: the small scenes are sheets of so many cells along each
+    side.
+    gap_samples: frames of a trajectory, at least, at which part speed solves the step again to know the
+    gap to its minimum. least_seconds [s]: of run time to be measured of each timed cell, whose short run
+    is done again until then. repeats: times that a cell of part speed is run, those whose first run took
+    at most repeat_seconds [s]. cell_seconds: time after which the process of a cell is ended [s].
     """
 
     name: str

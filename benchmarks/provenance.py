@@ -36,7 +36,9 @@ def commit() -> str:
     # No lock on the index: one would stay there where the disk is full. A tag is no commit.
     command = ["git", "--no-optional-locks", "-C", str(ROOT), "describe", "--always", "--abbrev=10"]
     command += ["--exclude=*", "--dirty=+changes"]
-    with suppress(OSError, subprocess.SubprocessError):  # no git here: the installed version is what is known
+    with suppress(
+        OSError, subprocess.SubprocessError
+    ):  # no git here: the installed version is what is known
         if (ROOT / ".git").exists():
             done = subprocess.run(command, capture_output=True, text=True, timeout=20, check=True)
             return done.stdout.strip()
@@ -54,15 +56,20 @@ def package_version(name: str) -> str:
 def processor_name() -> str:
     """Return the processor's name, family, model and stepping, or the architecture where it has no name.
 
-    Clouds give processors of several generations one name, which run times and last bits are not the same of.
+    Clouds give processors of several generations one name, which run times and last bits are not the same
+    of.
     """
     try:
         lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").partition("\n\n")[0].splitlines()
     except OSError:
         lines = []  # not Linux
-    facts = {name.strip(): " ".join(value.split()) for name, _, value in (s.partition(":") for s in lines)}
+    facts = {
+        name.strip(): " ".join(value.split()) for name, _, value in (s.partition(":") for s in lines)
+    }
     name = facts.get("model name") or platform.processor() or platform.machine()
-    which = [f"{key.split()[-1]} {facts[key]}" for key in ("cpu family", "model", "stepping") if key in facts]
+    which = [
+        f"{key.split()[-1]} {facts[key]}" for key in ("cpu family", "model", "stepping") if key in facts
+    ]
     return f"{name} ({', '.join(which)})" if which else name
 
 
@@ -138,8 +145,9 @@ def software(*places: str) -> dict[str, str]:
     """Return place -> digest of its files, and package -> version or "absent".
 
     Args:
-        *places: folders and files of the project, as `snug/body`, and absolute paths of users' files. A place
-            within another one is no part of its own. With a user's file everything that is installed counts.
+        *places: folders and files of the project, as `snug/body`, and absolute paths of users' files. A
+            place within another one is no part of its own. With a user's file everything that is
+            installed counts.
 
     Raises:
         DeclarationError: a place that is not there, or a file that cannot be read.

@@ -46,7 +46,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     add = parser.add_argument
     add("studies", nargs="*", metavar="STUDY", help="names of studies (default: all that have [show])")
-    add("-o", "--out", metavar="DIR", default=WORK, type=Path, help=f"where the runs lie (default {WORK})")
+    add(
+        "-o", "--out", metavar="DIR", default=WORK, type=Path, help=f"where the runs lie (default {WORK})"
+    )
     options = parser.parse_args(arguments)
     known, head, failed = published_studies(), commit(), 0
     names = options.studies or known
@@ -71,8 +73,8 @@ def published_studies() -> list[str]:
 def publish(name: str, out: Path, into: Path, head: str) -> None:
     """Run the study of that name or path below `out`, or go on with it; keep below `into` what is published.
 
-    Raises ResultsError where the run failed, has rows of another commit than `head`, or lacks a picture that
-    the documents show.
+    Raises ResultsError where the run failed, has rows of another commit than `head`, or lacks a picture
+    that the documents show.
     """
     show, whole = read_study(name).show, out / Path(name).stem
     assert show is not None
@@ -81,7 +83,9 @@ def publish(name: str, out: Path, into: Path, head: str) -> None:
         raise ResultsError(f"{whole}: has failed")
     if others := sorted({row.commit for row in RunFolder(whole).read_rows()} - {head, ""}):
         commits = ", ".join(others)
-        raise ResultsError(f"{whole}: rows of commit {commits}; remove the folder, or check that commit out")
+        raise ResultsError(
+            f"{whole}: rows of commit {commits}; remove the folder, or check that commit out"
+        )
     for film, wanted in show.films.items():
         path = whole / "figures" / film
         path.unlink(missing_ok=True)

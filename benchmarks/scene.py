@@ -31,8 +31,8 @@ class Scene:
     Attributes:
         name: in commands, rows and files.
         description: one line, for --list and run.json.
-        module: has `build(scene, assets, **options)`, which returns a BuiltScene, or says another function
-            behind a colon.
+        module: has `build(scene, assets, **options)`, which returns a BuiltScene, or says another
+            function behind a colon.
         declared_in, files: as of a MethodEntry.
         sizes: values of the preset that build() takes as options.
         options: further options of build().
@@ -144,8 +144,8 @@ class BuiltScene:
         glitch: the frame whose pose is wrong on purpose.
         kept: frames of the motion that a trajectory holds, or None for all.
         repeated: two sets of frames of the trajectory that show the same motion.
-        minimised: terms of simulations in place of `energies`, with self-contact, which no metric knows; none
-            where the cloth may cross itself.
+        minimised: terms of simulations in place of `energies`, with self-contact, which no metric knows;
+            none where the cloth may cross itself.
 
     Raises:
         ValueError: a warm-up below two.

@@ -110,8 +110,8 @@ def score(
         more: `rest_mesh`, `reference` and `folder` of `plan_score`.
 
     Raises:
-        ValueError: one line, where the roll-out cannot be read or does not belong to the scene, or where the
-            evaluation ended early.
+        ValueError: one line, where the roll-out cannot be read or does not belong to the scene, or where
+            the evaluation ended early.
         KeyboardInterrupt: it was interrupted.
 
     >>> score("mine.npz", "tshirt/kick")["metrics"]["energy/strain"]["value"]  # doctest: +SKIP
@@ -157,7 +157,9 @@ def plan_score(
 
         scenes = [declared(stored, str(rest_mesh))]
         scene = scenes[0].name
-    parts = {name: replace(part, cases=()) for name, part in study.parts.items()}  # some have a scene's name
+    parts = {
+        name: replace(part, cases=()) for name, part in study.parts.items()
+    }  # some have a scene's name
     plan = make_plan(
         replace(study, parts=parts, scenes=(scene,), methods=MEASURED_BESIDE, rollouts={name: stored}),
         folder=folder, command=command_line, scenes=scenes,

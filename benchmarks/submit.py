@@ -1,7 +1,8 @@
 """python -m benchmarks.submit: check an entry of another author, and score it from its vertices.
 
-An entry is a folder of the method's name: entry.toml, and roll-outs or a program that makes them. Its scores
-are a run's rows without clock and machine; they lie in `scores` with the digests of all that was scored.
+An entry is a folder of the method's name: entry.toml, and roll-outs or a program that makes them. Its
+scores are a run's rows without clock and machine; they lie in `scores` with the digests of all that was
+scored.
 """
 
 from __future__ import annotations
@@ -145,7 +146,9 @@ class Entry:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
     parser = Parser(
-        prog=f"python -m {PROGRAM}", description="Check and score an entry of the benchmark.", epilog=EXAMPLES
+        prog=f"python -m {PROGRAM}",
+        description="Check and score an entry of the benchmark.",
+        epilog=EXAMPLES,
     )
     parser.add_argument("action", choices=("check", "score"), help="check alone, or check and score")
     parser.add_argument("entry", metavar="DIR", help="folder of the entry")
@@ -187,8 +190,8 @@ def check_scores(entry: Entry) -> None:
 def write_scores(entry: Entry, run: RunFolder) -> int:
     """Write rows without what the machine adds to them, and digests of all that was scored; return how many.
 
-    The bytes are the same each time. Raises EntryError where a roll-out did not come to its last frame: the
-    mean over the other scenes would be of easier ones.
+    The bytes are the same each time. Raises EntryError where a roll-out did not come to its last frame:
+    the mean over the other scenes would be of easier ones.
     """
     from benchmarks.metrics import find_metric  # loads numpy
 

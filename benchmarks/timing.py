@@ -1,10 +1,10 @@
 """The one clock: monotonic, stopped only when every position is there and nothing works on.
 
-What it counts is `run()` and the touching of every frame. Loading, compiling, warming up, metrics and writing
-are outside: a first run in which numba compiled a kernel is no measurement. Short work is done again until
-enough time is measured. A method that comes back before its work is done is found out: its positions still
-change, its process still computes, it has used more processor than one thread can, or it gives again what it
-had kept.
+What it counts is `run()` and the touching of every frame. Loading, compiling, warming up, metrics and
+writing are outside: a first run in which numba compiled a kernel is no measurement. Short work is done
+again until enough time is measured. A method that comes back before its work is done is found out: its
+positions still change, its process still computes, it has used more processor than one thread can, or it
+gives again what it had kept.
 """
 
 from __future__ import annotations
@@ -26,7 +26,9 @@ from typing import TYPE_CHECKING, TypeVar
 if TYPE_CHECKING:
     import numpy as np
 
-AFTER = 0.05  # [s] for which the process is watched once the clock has stopped, and again where it is at work
+AFTER = (
+    0.05  # [s] for which the process is watched once the clock has stopped, and again where it is at work
+)
 WATCHES = 3  # times in a row; a machine that is busy elsewhere lends its time to one of them, not to all
 BUSY = 0.3  # share of AFTER which the processor may be at work
 CROWDED = 1.3  # processor seconds per second on the clock, beyond which more than one thread has worked
@@ -117,7 +119,9 @@ def _compilations() -> Iterator[list[object]]:
 
 
 def _still_at_work(
-    positions: np.ndarray, threads: set[threading.Thread], children: set[multiprocessing.process.BaseProcess]
+    positions: np.ndarray,
+    threads: set[threading.Thread],
+    children: set[multiprocessing.process.BaseProcess],
 ) -> str:
     """Watch the process for a moment: what does it do after it said that it was done?"""
     import numpy as np
@@ -149,8 +153,8 @@ def _synchronise() -> None:
 def peak_memory() -> float:
     """Return the most memory that this process has held at once [MB].
 
-    Linux keeps it per memory image; ru_maxrss there would still hold what the parent had before this process
-    loaded its own program.
+    Linux keeps it per memory image; ru_maxrss there would still hold what the parent had before this
+    process loaded its own program.
     """
     import resource
 

@@ -1,11 +1,12 @@
 """Sparse Cholesky factorisations: by a package, and a compiled one to be called in the middle of a step.
 
 A package analyses once, factorises often and solves; not positive definite is an answer. It is CHOLMOD
-through cvxopt (GPLv3) with METIS nested dissection; where cvxopt is missing, SuperLU from scipy does the same
-job several times slower.
+through cvxopt (GPLv3) with METIS nested dissection; where cvxopt is missing, SuperLU from scipy does the
+same job several times slower.
 
-The compiled one is LDL^T row by row (Davis 2005, "LDL: a concise sparse Cholesky factorization package"): row
-k of L solves a triangular system with the rows above it. It keeps up with a package to some 10,000 rows.
+The compiled one is LDL^T row by row (Davis 2005, "LDL: a concise sparse Cholesky factorization package"):
+row k of L solves a triangular system with the rows above it. It keeps up with a package to some 10,000
+rows.
 """
 
 from __future__ import annotations
@@ -72,7 +73,10 @@ class SuperLUSolver:
         A = sp.csc_matrix(lower + sp.tril(lower, -1).T)[self._order][:, self._order]
         try:
             lu = spla.splu(
-                sp.csc_matrix(A), permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+                sp.csc_matrix(A),
+                permc_spec="NATURAL",
+                diag_pivot_thresh=0.0,
+                options={"SymmetricMode": True},
             )
         except RuntimeError:  # exactly singular
             return False
@@ -134,7 +138,8 @@ class ScalarPattern:
         by_rows = (np.ones(len(self.factor_columns)), self.factor_columns, self.factor_rows)
         by_columns = sp.csr_matrix(by_rows, shape=(count, count)).tocsc()
         self.starts, self.rows = by_columns.indptr.astype(np.int64), by_columns.indices
-        # A signed index is first asked whether it counts from the end: a quarter of a factorisation's time.
+        # A signed index is first asked whether it counts from the end: a quarter of a factorisation's
+        # time.
         self.row_columns, self.factor_columns, self.rows = (
             columns.astype(np.uint32) for columns in (self.row_columns, self.factor_columns, self.rows)
         )
@@ -142,7 +147,8 @@ class ScalarPattern:
     def places(self, stencils: np.ndarray) -> np.ndarray:
         """Return where (E, k, k) the entries of the elements' matrices are added.
 
-        It is -1 for those above the diagonal, of pinned vertices, and of an element that has a vertex twice.
+        It is -1 for those above the diagonal, of pinned vertices, and of an element that has a vertex
+        twice.
         """
         i = np.append(self._place, -1)[stencils]
         row, column = np.broadcast_arrays(i[:, :, None], i[:, None, :])
@@ -189,7 +195,9 @@ def _row_patterns(starts, columns, row, out):
 
 
 @njit(cache=True, error_model="numpy")
-def factorise(values, row_starts, row_columns, factor_rows, factor_columns, starts, rows, L, D, y, filled):
+def factorise(
+    values, row_starts, row_columns, factor_rows, factor_columns, starts, rows, L, D, y, filled
+):
     """Write L (by columns) and D (n,) of the matrix with these values; False if a pivot is not positive.
 
     y (n,) zeros and filled (n,): room to work in.

@@ -63,11 +63,18 @@ class Cloth:
                     f"rest_uv has shape {uv.shape}: expected finite ({len(positions)}, 2) or "
                     f"({len(faces)}, 3, 2)"
                 )
-        for name, value in (("rest_positions", positions), ("faces", faces), ("pins", pins), ("rest_uv", uv)):
+        for name, value in (
+            ("rest_positions", positions),
+            ("faces", faces),
+            ("pins", pins),
+            ("rest_uv", uv),
+        ):
             object.__setattr__(self, name, value)
         small = np.flatnonzero(~(self.areas > 1e-12 * self.areas.max()))
         if small.size:
-            raise MeshError(f"face {small[0]} has no rest area ({self.areas[small[0]]:.3g} m^2): remove it")
+            raise MeshError(
+                f"face {small[0]} has no rest area ({self.areas[small[0]]:.3g} m^2): remove it"
+            )
         _ = self._edge_table  # raises on non-manifold edges
 
     @property

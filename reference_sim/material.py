@@ -39,7 +39,9 @@ class Material:
         for name in ("young_modulus", "thickness", "density"):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
-                raise ValueError(f"Material.{name} = {value!r}: must be a finite number above 0 (SI units)")
+                raise ValueError(
+                    f"Material.{name} = {value!r}: must be a finite number above 0 (SI units)"
+                )
         if not -1 < self.poisson_ratio <= 0.5:
             raise ValueError(f"Material.poisson_ratio = {self.poisson_ratio!r}: must lie in (-1, 0.5]")
         if not (math.isfinite(self.bending_stiffness) and self.bending_stiffness >= 0):
@@ -59,7 +61,12 @@ class Material:
             return make(**values)
         except FileNotFoundError:
             raise ValueError(f"{path}: no such file") from None
-        except (ValueError, TypeError, OverflowError, RecursionError) as error:  # also of text that is none
+        except (
+            ValueError,
+            TypeError,
+            OverflowError,
+            RecursionError,
+        ) as error:  # also of text that is none
             reason = " ".join(str(error).split())
             raise ValueError(f"{path}: {reason}; give fields of Material in SI units") from None
 

@@ -32,7 +32,8 @@ class Planes:
 def reachable_faces(rest_points: np.ndarray, centroids: np.ndarray, region: float) -> np.ndarray:
     """Return the faces that some sample may meet: those with a centroid no farther away than `region` [m].
 
-    rest_points (S, 3) and centroids (F, 3) [m] are at rest. Where a sample has no such face, it is all faces.
+    rest_points (S, 3) and centroids (F, 3) [m] are at rest. Where a sample has no such face, it is all
+    faces.
     """
     from scipy.spatial import cKDTree
 
@@ -127,8 +128,8 @@ class Obstacle:
     def _nearest(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Closest:
         """Find closest points under the rule of regions.
 
-        Each search begins with the faces that the last one answered for as many points, in groups made for
-        the first one: the solver asks for the same samples in every frame.
+        Each search begins with the faces that the last one answered for as many points, in groups made
+        for the first one: the solver asks for the same samples in every frame.
         """
         frame = min(frame, self.frames - 1)
         if self._search is None:
@@ -145,7 +146,9 @@ class Obstacle:
         hints, samples, home = self._last.get(kind, (None, None, None))
         if samples is None or not (home is rest_points or np.array_equal(home, rest_points)):  # type: ignore[arg-type]
             home = rest_points
-            samples = self._search.listed(points) if home is None else self._search.listed(home, self.region)
+            samples = (
+                self._search.listed(points) if home is None else self._search.listed(home, self.region)
+            )
         closest = self._search.nearest(points, hints=hints, samples=samples)
         self._last[kind] = closest.faces, samples, home
         return closest
@@ -153,9 +156,10 @@ class Obstacle:
     def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
         """Return contact planes at `frame`.
 
-        The plane goes through the closest allowed point of the surface; its normal points from there to the
-        sample (from the sample, when that is inside), which makes n.(x - c) the signed distance at the
-        sample's own position. Beyond the border of the allowed faces it fades: see `surface.plane_normals`.
+        The plane goes through the closest allowed point of the surface; its normal points from there to
+        the sample (from the sample, when that is inside), which makes n.(x - c) the signed distance at
+        the sample's own position. Beyond the border of the allowed faces it fades: see
+        `surface.plane_normals`.
 
         points (S, 3) [m]: samples. rest_points (S, 3) [m]: the samples at rest, for the rule of regions.
         """

@@ -21,12 +21,12 @@ SPARE_BLOCKS = 3
 class HessianPattern:
     """Pattern of the sum of `energies` over the free vertices, built once per scene.
 
-    Dynamic terms have no blocks in it at first: `covering` gives a wider pattern when they couple vertices
-    that no other term couples.
+    Dynamic terms have no blocks in it at first: `covering` gives a wider pattern when they couple
+    vertices that no other term couples.
 
-    The matrix is stored as the lower triangle of vertex blocks (diagonal blocks whole), in CSC order, as a
-    Cholesky factorisation reads it. Blocks are 3 x 3 for a Hessian, 1 x 1 for a scalar stiffness that the
-    coordinates share.
+    The matrix is stored as the lower triangle of vertex blocks (diagonal blocks whole), in CSC order, as
+    a Cholesky factorisation reads it. Blocks are 3 x 3 for a Hessian, 1 x 1 for a scalar stiffness that
+    the coordinates share.
 
     Attributes:
         free: (n,) indices of the free vertices, in the order of the matrix.
@@ -76,8 +76,8 @@ class HessianPattern:
     def covering(self, changing: Sequence[sp.csc_matrix]) -> HessianPattern:
         """Return this pattern, or a wider one if the matrices couple vertices that have no block here.
 
-        A wider pattern keeps the blocks it had, so that pairs which come and go do not cost an analysis each
-        time, until more than SPARE_BLOCKS times the needed ones are kept.
+        A wider pattern keeps the blocks it had, so that pairs which come and go do not cost an analysis
+        each time, until more than SPARE_BLOCKS times the needed ones are kept.
         """
         if not changing:
             return self
@@ -208,7 +208,9 @@ class Potential:
         for energy in self.energies:
             if energy.cloth is not self.cloth:
                 first = self.energies[0].name
-                raise ValueError(f"energies {first!r} and {energy.name!r} are of different cloths: use one")
+                raise ValueError(
+                    f"energies {first!r} and {energy.name!r} are of different cloths: use one"
+                )
         names = [energy.name for energy in self.energies]
         for name in names:
             if names.count(name) > 1:  # one would hide the other in tables and files

@@ -82,7 +82,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     found = simulate(cloth, terms, dt=options.dt, frames=frames, obstacle=obstacle, progress=path.name)
     found.save(path)
     fields = found.frame_fields
-    last = [f"{name[7:]} {values[-1]:.3g}" for name, values in fields.items() if name.startswith("energy/")]
+    last = [
+        f"{name[7:]} {values[-1]:.3g}" for name, values in fields.items() if name.startswith("energy/")
+    ]
     print(
         f"frames     {found.frames} of {frames}, {int(fields['converged'].sum())} converged\n"
         f"status     {found.status}{found.reason and ': '}{found.reason}\n"
@@ -111,13 +113,17 @@ def choose_pins(which: str | None, positions: np.ndarray) -> list[int]:
         return (height >= height.max() - 0.01 * (height.max() - height.min())).nonzero()[0].tolist()
     words = [word.strip() for word in which.split(",")]
     if not all(word.isdecimal() and int(word) < len(positions) for word in words):
-        raise ValueError(f"--pins {which!r}: give 'top', or vertices from 0 to {len(positions) - 1} as '0,9'")
+        raise ValueError(
+            f"--pins {which!r}: give 'top', or vertices from 0 to {len(positions) - 1} as '0,9'"
+        )
     return [int(word) for word in words]
 
 
 def read_obstacle(options: argparse.Namespace) -> Obstacle:
     """Return the obstacle of its files. Raises ValueError that names the file, and the remedy."""
-    from reference_sim.obstacle import Obstacle  # its search for contact serves no cloth that meets nothing
+    from reference_sim.obstacle import (
+        Obstacle,
+    )  # its search for contact serves no cloth that meets nothing
 
     positions, surface = read_sequence(options.obstacle)
     axes, rest = {"units": options.units, "up": options.up}, None

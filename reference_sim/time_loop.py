@@ -2,8 +2,8 @@
 
     x_{t+1} = argmin  1/(2 dt^2) (x - x_hat)^T M (x - x_hat) + Phi(x),   x_hat = x_t + dt v_t
 
-(SNUG, eq. 4; Martin et al. 2011; Gast et al. 2015). The velocity of the next step is (x_{t+1} - x_t) / dt.
-With sub-steps a stored frame is n such steps of dt / n, pins and obstacle moving linearly in between.
+(SNUG, eq. 4; Martin et al. 2011; Gast et al. 2015). The velocity of the next step is (x_{t+1} - x_t) /
+dt. With sub-steps a stored frame is n such steps of dt / n, pins and obstacle moving linearly in between.
 """
 
 from __future__ import annotations
@@ -49,20 +49,21 @@ class TimeStepper:
         energies, dt, obstacle: as in `simulate`.
         substeps: backward-Euler steps per frame. Each is a minimisation; frame fields then hold sums of
             counts, the worst gradient norm, and the energies of the last sub-step.
-        guess: initial guess of a step: "previous", "extrapolated" (x + dt v), or "body_transported", moved
-            along with the obstacle's nearest faces (default where there is an obstacle; else "extrapolated");
-            or a function of the step's number, 1 for the first of a run, and its start (V, 3) [m] that
-            returns positions (V, 3) [m]. Pins are then put in place, and contact planes are taken there. The
-            first step is asked for twice where a start is checked, so the answer should depend on the
-            arguments alone.
+        guess: initial guess of a step: "previous", "extrapolated" (x + dt v), or "body_transported",
+            moved along with the obstacle's nearest faces (default where there is an obstacle; else
+            "extrapolated"); or a function of the step's number, 1 for the first of a run, and its start
+            (V, 3) [m] that returns positions (V, 3) [m]. Pins are then put in place, and contact planes
+            are taken there. The first step is asked for twice where a start is checked, so the answer
+            should depend on the arguments alone.
         quasi_static: set the velocity to zero after every step, sub-steps included; for settling.
-        refreeze: times that what is frozen in a step, as contact planes, is searched again where the step has
-            ended, and the step solved again from there.
-        options: of the minimiser: method ("newton", "lbfgs", which Newton's method finishes, or a function
-            that makes one of a potential and the other options), tolerance, max_iterations, timeout [s] of
-            one minimisation, ... The default method is "lbfgs", or "newton" with a term whose pairs change
-            with x, as a barrier's do. Where such a term joins a step late (self-contact alone), the method is
-            that of the minimisation without the term, by default "lbfgs", and Newton's method ends the step.
+        refreeze: times that what is frozen in a step, as contact planes, is searched again where the step
+            has ended, and the step solved again from there.
+        options: of the minimiser: method ("newton", "lbfgs", which Newton's method finishes, or a
+            function that makes one of a potential and the other options), tolerance, max_iterations,
+            timeout [s] of one minimisation, ... The default method is "lbfgs", or "newton" with a term
+            whose pairs change with x, as a barrier's do. Where such a term joins a step late
+            (self-contact alone), the method is that of the minimisation without the term, by default
+            "lbfgs", and Newton's method ends the step.
 
     Raises ValueError for an unknown guess, fewer than 1 sub-step, a time step or tolerance not above 0, a
     function as method beside a term that joins a step late, which Newton's method ends.
@@ -110,7 +111,9 @@ class TimeStepper:
             if infeasibility := self.potential.infeasibility(x):
                 raise ValueError(f"simulate: the start is not free of intersections: {infeasibility}")
 
-    def advance(self, frame: int, state: State, pins: np.ndarray | None) -> tuple[State | None, list[Result]]:
+    def advance(
+        self, frame: int, state: State, pins: np.ndarray | None
+    ) -> tuple[State | None, list[Result]]:
         """Take the sub-steps to `frame`, with pins (P, 3) [m] at its end.
 
         Returns the state at the frame, None if a sub-step diverged, and the result of each sub-step, also
@@ -292,9 +295,9 @@ def simulate(
 def _worst(status: str, reason: str, frame: int, results: Sequence[Result]) -> tuple[str, str]:
     """Return status and reason of a run after the minimisations on the way to `frame`.
 
-    The worst counts, and of equally bad ones the first: a solver that is stopped early gives up in frame 1,
-    which must not hide a later divergence. Until one did not converge, the reason is that of the first that
-    converged within round-off alone.
+    The worst counts, and of equally bad ones the first: a solver that is stopped early gives up in frame
+    1, which must not hide a later divergence. Until one did not converge, the reason is that of the first
+    that converged within round-off alone.
     """
     for result in results:
         if STATUSES[result.status] > STATUSES[status] or (result.relaxed and not reason):

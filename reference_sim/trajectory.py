@@ -1,7 +1,7 @@
 """Trajectory: positions over time, whether and how they converged, and its files.
 
-The file is VTKHDF (temporal PolyData), so ParaView opens it as it is; what VTK has no place for lies in the
-top-level group /benchmark. Blender's Mesh Cache modifier reads a point cache, PC2: a header, then
+The file is VTKHDF (temporal PolyData), so ParaView opens it as it is; what VTK has no place for lies in
+the top-level group /benchmark. Blender's Mesh Cache modifier reads a point cache, PC2: a header, then
 float32 positions, sample by sample. PC16 is the same in float16.
 """
 

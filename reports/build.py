@@ -1,8 +1,9 @@
 """python -m reports.build RUN_DIR: tables, figures, page and PDF of a finished run.
 
 Reads run.json, results.csv, frame_energies.csv and trajectories in RUN_DIR, and nothing else; writes
-tables/*.csv, figures/*.svg and *.png, report.html and report.pdf there. Run twice, it writes the same bytes.
-Of a run without trajectories, pictures of roll-outs that lie in figures/ stay and stand in the PDF.
+tables/*.csv, figures/*.svg and *.png, report.html and report.pdf there. Run twice, it writes the same
+bytes. Of a run without trajectories, pictures of roll-outs that lie in figures/ stay and stand in the
+PDF.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ class Built:
 
     Attributes:
         pdf: path of the PDF.
-        problems: a sentence for each file that could not be read, times of several machines, edited files.
+        problems: a sentence for each file that could not be read, times of several machines, edited
+            files.
         answer: page one in few lines of text, empty for a run that has none.
     """
 
@@ -36,8 +38,8 @@ def build_report(run_dir: str | Path) -> Built:
     """Make tables, figures, page and PDF of a run.
 
     Raises:
-        ResultsError: when run.json or results.csv is absent, broken or of an earlier version; before anything
-            is written.
+        ResultsError: when run.json or results.csv is absent, broken or of an earlier version; before
+            anything is written.
 
     >>> print(build_report("reports/runs/first").answer)  # doctest: +SKIP
     """

@@ -1,7 +1,7 @@
 """python -m reports.compare A B: changes from run A to run B beyond the noise of both; fails if worse.
 
-Suite garments is compared by garment over its motions and seeds, and motion by motion; every other scene by
-itself, over its seeds.
+Suite garments is compared by garment over its motions and seeds, and motion by motion; every other scene
+by itself, over its seeds.
 """
 
 from __future__ import annotations

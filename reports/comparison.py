@@ -2,11 +2,11 @@
 
 Changes of single scenes of a garment, which a mean over its motions hides.
 
-A network is tested in each scene over its seeds. Three seeds say little of their scatter, so the scatter is
-pooled over the scenes of the method, and a scene that scatters more has its own. A scene that scatters far
-more than most stays out of the pool: one motion on which seeds disagree would hide changes of all others.
-The test is Student's with the pooled degrees of freedom, corrected by Bonferroni for all of these tests. A
-method without seeds is compared with the uncertainty that the reference's ensemble leaves.
+A network is tested in each scene over its seeds. Three seeds say little of their scatter, so the scatter
+is pooled over the scenes of the method, and a scene that scatters more has its own. A scene that scatters
+far more than most stays out of the pool: one motion on which seeds disagree would hide changes of all
+others. The test is Student's with the pooled degrees of freedom, corrected by Bonferroni for all of these
+tests. A method without seeds is compared with the uncertainty that the reference's ensemble leaves.
 """
 
 from __future__ import annotations
@@ -37,7 +37,9 @@ ENERGY_TOLERANCE = 0.02  # share of an energy
 TOLERANCE = 0.05  # share of any other answer
 TIME_TOLERANCE = 0.15  # share of a time or memory that was repeated
 ONCE = 2.0  # factor of a time that was taken once: below it another load of the machine may be the cause
-FLOOR = 1e-4  # share of the median method's value; a smaller difference is none, whatever it is a share of
+FLOOR = (
+    1e-4  # share of the median method's value; a smaller difference is none, whatever it is a share of
+)
 SPREADS = 3.0  # of the reference's ensemble, beyond which an answer that nothing repeats has changed
 
 
@@ -82,7 +84,9 @@ def side(metric: Metric, difference: float) -> str:
 def size_of(metric: Metric, mean: Mean, new: Mean, far: Effect, p: float | None) -> str:
     """Return a change as "0.21 ± 0.010 -> 0.26 ± 0.010 J, × 1.24 (1.20 to 1.28), p 0.0030"."""
     before, after = (with_spread(m.value, m.spread_or_uncertainty) for m in (mean, new))
-    text = f"{before} -> {after}{_unit(metric)}, {'×' if far.scale == RATIO else 'by'} {number(far.shown)}"
+    text = (
+        f"{before} -> {after}{_unit(metric)}, {'×' if far.scale == RATIO else 'by'} {number(far.shown)}"
+    )
     if far.interval:
         text += f" ({' to '.join(number(end) for end in far.interval)})"
     return text + ("" if p is None else f", p {number(p, 2)}")
@@ -150,8 +154,8 @@ def _differences(metric: Metric, rows: pd.DataFrame) -> pd.DataFrame:
     """Return for each scene of one method the difference of the later run from the earlier.
 
     before, after: means over seeds. far: the difference on the scale, of logarithms where all values are
-    positive, else plain. least: the largest one on that scale that is no change. error: its standard error, 0
-    without seeds. freedom: degrees of freedom of the error.
+    positive, else plain. least: the largest one on that scale that is no change. error: its standard
+    error, 0 without seeds. freedom: degrees of freedom of the error.
     """
     values, run = rows["value"].to_numpy(), rows["run"].to_numpy()
     relative = metric.name.startswith("relative_excess/")
@@ -277,7 +281,13 @@ class Comparison:
 
 
 def compare(
-    one: Run, other: Run, metrics: str = "*", methods: str = "*", *, times: bool = True, shared: bool = False
+    one: Run,
+    other: Run,
+    metrics: str = "*",
+    methods: str = "*",
+    *,
+    times: bool = True,
+    shared: bool = False,
 ) -> Comparison:
     """Compare two runs.
 
@@ -290,8 +300,8 @@ def compare(
         shared: leave out what the later run lacks; otherwise it is a change for the worse.
 
     Raises:
-        ResultsError: where protocols differ, of the runs or of a cell, or presets, sizes, body or garment, or
-            nothing is shared.
+        ResultsError: where protocols differ, of the runs or of a cell, or presets, sizes, body or
+            garment, or nothing is shared.
     """
     one_protocol((one.protocol, other.protocol), "A and B")
     _demand_same_scenes(one, other)
@@ -306,7 +316,9 @@ def compare(
     keys = [frame.set_index(CELL).index for frame in of_metrics]
     kept = [frame[key.isin(rest)] for frame, key, rest in zip(of_metrics, keys, reversed(keys))]
     if kept[0].empty:
-        raise ResultsError("the two runs share no such scene, method, seed and metric: nothing to compare")
+        raise ResultsError(
+            "the two runs share no such scene, method, seed and metric: nothing to compare"
+        )
     before, after = (frame.set_index(CELL)["protocol"] for frame in kept)
     differ = before[before != after.reindex(before.index)]
     if len(differ):
@@ -345,7 +357,9 @@ def _cells(run: Run) -> pd.DataFrame:
     worn = (frame["suite"] == "garments") & (frame["garment"] != "")
     frame = frame.assign(place=frame["garment"].where(worn, frame["scene"]))
     cell = ["scene", "method", "seed"]
-    inference, repeats = (frame[frame["metric"] == name].set_index(cell)["value"] for name in (TIME, REPEATS))
+    inference, repeats = (
+        frame[frame["metric"] == name].set_index(cell)["value"] for name in (TIME, REPEATS)
+    )
     timed = frame["metric"].isin((TIME, WHOLE))  # inference alone is repeated, its inputs are not
     apart = (inference * repeats / 100.0).reindex(pd.MultiIndex.from_frame(frame.loc[timed, cell]))
     frame.loc[timed, "uncertainty"] = apart.to_numpy()
@@ -369,7 +383,9 @@ def _means(
     first, second = (means(frame, *GROUP).to_dict() for frame in rows)
     differ = {key: (mean, second[key]) for key, mean in first.items() if mean.cells != second[key].cells}
     known = _metrics(run)
-    scales = rows[0].groupby(["place", "metric"])["value"].agg(lambda values: values.abs().median()).to_dict()
+    scales = (
+        rows[0].groupby(["place", "metric"])["value"].agg(lambda values: values.abs().median()).to_dict()
+    )
     judged = [
         (place, method, metric := known[name], mean, new, _effect(metric, new, mean))
         for (place, method, name), (mean, new) in differ.items()

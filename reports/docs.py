@@ -50,7 +50,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     stale = [(path, made) for path, text, made in documents() if made != text]
     for path, made in stale:
         if options.check:
-            print(f"{path}: not what the published runs give; run python -m reports.docs", file=sys.stderr)
+            print(
+                f"{path}: not what the published runs give; run python -m reports.docs", file=sys.stderr
+            )
         else:
             with replacing(path) as temporary:
                 temporary.write_text(made, encoding="utf-8", newline="\n")

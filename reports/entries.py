@@ -76,7 +76,9 @@ def of_entry(folder: Path) -> Scored:
         raise ResultsError(f"{folder}: has no scores: {again}")
     run, name = read_run(scores), folder.resolve().name
     try:
-        title, authors, data = (run.config["metadata"][key] for key in ("title", "authors", "training_data"))
+        title, authors, data = (
+            run.config["metadata"][key] for key in ("title", "authors", "training_data")
+        )
     except (KeyError, TypeError):
         raise ResultsError(f"{scores.config_path}: has no metadata of an entry: {again}") from None
     scenes = tuple(sorted(set(run.frame[run.frame["method"] == name]["scene"])))
@@ -91,7 +93,9 @@ def of_published(name: str, run: Run, scenes: Sequence[str]) -> list[Scored]:
     rows = run.garment_rows
     rows = rows[rows["scene"].isin(scenes) & rows["usable"]]
     methods = run.ordered(set(rows["method"]) & set(run.with_role(*ROLES)))
-    return [Scored(run, method, run.label(method), f"see run {name}", tuple(scenes)) for method in methods]
+    return [
+        Scored(run, method, run.label(method), f"see run {name}", tuple(scenes)) for method in methods
+    ]
 
 
 def full_scenes(run: Run) -> tuple[str, ...]:
@@ -104,15 +108,18 @@ def full_scenes(run: Run) -> tuple[str, ...]:
 def entries_tables(entries: Sequence[Scored], name: str, run: Run) -> list[tuple[Table, Run]]:
     """Return a table for each protocol and set of scenes, full ones first, and a run of its protocol.
 
-    No table has rows of two protocols, or means over different scenes. Methods of the published run of that
-    name stand in each table of their protocol. Rows are sorted by relative excess, rows without it last.
+    No table has rows of two protocols, or means over different scenes. Methods of the published run of
+    that name stand in each table of their protocol. Rows are sorted by relative excess, rows without it
+    last.
     """
     full = full_scenes(run)
     groups: dict[tuple[str, tuple[str, ...]], list[Scored]] = {(run.protocol, tuple(sorted(full))): []}
     for entry in entries:
         groups.setdefault((entry.run.protocol, entry.scenes), []).append(entry)
     tables = []
-    for (protocol, scenes), scored in sorted(groups.items(), key=lambda item: (-len(item[0][1]), item[0])):
+    for (protocol, scenes), scored in sorted(
+        groups.items(), key=lambda item: (-len(item[0][1]), item[0])
+    ):
         every = [*scored, *(of_published(name, run, scenes) if protocol == run.protocol else ())]
         lines = sorted(((entry.cells(), entry) for entry in every), key=lambda line: _excess(line[0]))
         part = "all" if set(scenes) == set(full) else f"{len(scenes)} of {len(full)}: {', '.join(scenes)}"

@@ -73,7 +73,9 @@ def select_roll_outs(
         cloth = run.roll_outs.cloth(scene, method, int(chosen)) if len(of_method) else None
         if cloth is None or not cloth.finite().frames:
             kept = sorted(path.parent.name for path in folder.trajectories.glob("*/*.vtkhdf"))
-            reason = "; ".join(run.problems) or f"scenes with roll-outs are {', '.join(dict.fromkeys(kept))}"
+            reason = (
+                "; ".join(run.problems) or f"scenes with roll-outs are {', '.join(dict.fromkeys(kept))}"
+            )
             raise ResultsError(f"{folder.path}: no roll-out of '{method}' in {scene}: {reason}")
         cloths[method] = cloth.finite()
     labels = {name: run.label(name) for name in cloths}
@@ -144,7 +146,8 @@ def _composed(selected: SceneRollOuts, pictures: np.ndarray, frame: int, time: f
 def write_gif(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:
     """Write a GIF whose hundredths of a second add up to the right time, in shades of the film's colours.
 
-    Browsers show a frame for two hundredths or more: of a higher rate every second or third frame is kept.
+    Browsers show a frame for two hundredths or more: of a higher rate every second or third frame is
+    kept.
     """
     from PIL import Image
 

@@ -47,7 +47,9 @@ class RollOuts:
                 return None
             trajectory = Trajectory.load(path)
             if (curves := path.with_suffix(".npz")).is_file():
-                trajectory = replace(trajectory, frame_fields=trajectory.frame_fields | read_arrays(curves))
+                trajectory = replace(
+                    trajectory, frame_fields=trajectory.frame_fields | read_arrays(curves)
+                )
             if trajectory.frames:
                 return trajectory
             problem = f"{path}: holds no whole frame"
@@ -78,10 +80,10 @@ class ReportedMethod:
 class Run:
     """Rows of a run, their declarations, and what else its folder holds.
 
-    frame: one line per row, the columns of results.csv and `usable` (its value may enter a mean), `table` (of
-    its metric) and `case` (the check or stress test that it is, else empty). changed: files that are not as
-    the run wrote them. protocol: of its rows; empty where all are a user's own. frame_energies: lines of
-    frame_energies.csv, empty without the file. roll_outs: reads stored roll-outs
+    frame: one line per row, the columns of results.csv and `usable` (its value may enter a mean), `table`
+    (of its metric) and `case` (the check or stress test that it is, else empty). changed: files that are
+    not as the run wrote them. protocol: of its rows; empty where all are a user's own. frame_energies:
+    lines of frame_energies.csv, empty without the file. roll_outs: reads stored roll-outs
     when they are asked for. problems: a sentence for each file that could not be read, added to while
     roll-outs are read.
     """
@@ -212,7 +214,10 @@ def make_run(config: Mapping[str, Any], rows: Sequence[Row], changed: Sequence[s
     frame["usable"] = frame["status"].isin(USABLE) & finite
     declared = config.get("metrics") or {}
     units = dict(zip(frame["metric"], frame["unit"]))
-    names = [*(name for name in declared if name in units), *(name for name in units if name not in declared)]
+    names = [
+        *(name for name in declared if name in units),
+        *(name for name in units if name not in declared),
+    ]
     metrics = {name: _metric(name, units[name], declared.get(name) or {}) for name in names}
     frame["table"] = frame["metric"].map({name: metric.table for name, metric in metrics.items()})
     frame["case"] = _cases(frame, config.get("cases") or {})
@@ -247,7 +252,9 @@ def _methods(frame: pd.DataFrame, declared: Mapping[str, Any]) -> dict[str, Repo
 
 def _cases(frame: pd.DataFrame, declared: Mapping[str, Any]) -> list[str]:
     """Return the case of each row: declared by scene and metric, or else by the scene as its name."""
-    places = {(case.get("scene") or name, case.get("metric") or ""): name for name, case in declared.items()}
+    places = {
+        (case.get("scene") or name, case.get("metric") or ""): name for name, case in declared.items()
+    }
     pairs = zip(frame["scene"], frame["metric"])
     return [places.get(pair) or places.get((pair[0], "")) or "" for pair in pairs]
 
@@ -256,8 +263,8 @@ def read_run(folder: RunFolder) -> Run:
     """Read rows and declarations of a run; its roll-outs are read when they are asked for.
 
     Raises:
-        ResultsError: when run.json or results.csv is absent, broken or of an earlier version, or rows are of
-            two protocols, which no table may mix.
+        ResultsError: when run.json or results.csv is absent, broken or of an earlier version, or rows are
+            of two protocols, which no table may mix.
 
     >>> run = read_run(RunFolder("reports/runs/first"))  # doctest: +SKIP
     """

@@ -36,7 +36,9 @@ def configuration(config: Mapping[str, Any], frame: pd.DataFrame) -> list[list[s
     pairs = {name.capitalize(): _text(config[name]) for name in SHOWN if config.get(name)}
     pairs["Motions"] = ", ".join(sorted(set(frame["motion"]) - {""}))
     pairs["Numbers"] = ", ".join(sorted(set(frame["dtype"]) - {""}))
-    return [[title, shorten(text, MOST_LETTERS, placeholder="…")] for title, text in pairs.items() if text]
+    return [
+        [title, shorten(text, MOST_LETTERS, placeholder="…")] for title, text in pairs.items() if text
+    ]
 
 
 def _text(value: Any) -> str:
@@ -75,7 +77,9 @@ def lay_out_table(run: Run, table: Table) -> Values:
     columns = [table.columns[place] for place in places]
     cells = []
     for rank, (place, column) in enumerate(zip(places, columns)):
-        printed = [label if rank == 0 else texts.get(column.name, DASH) for label, texts in table.references]
+        printed = [
+            label if rank == 0 else texts.get(column.name, DASH) for label, texts in table.references
+        ]
         cells.append(column_texts(run, column, [row[place] for row in table.rows], printed))
     lines = [list(line) for line in zip(*cells)]
     groups: dict[str, list[list[CellText]]] = {}

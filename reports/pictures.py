@@ -1,7 +1,7 @@
 """Pictures of garments: methods side by side at one frame, and the worst failures.
 
-They are drawn on the processor, by a depth buffer: no OpenGL is needed, whose drivers kill the process where
-there is no display, and the same machine gives the same bytes.
+They are drawn on the processor, by a depth buffer: no OpenGL is needed, whose drivers kill the process
+where there is no display, and the same machine gives the same bytes.
 """
 
 from __future__ import annotations
@@ -121,7 +121,8 @@ def _covered(corners: np.ndarray, w: int, h: int) -> tuple[np.ndarray, np.ndarra
     area = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
     seen = np.flatnonzero((high > low).all(axis=1) & (area != 0.0))  # from its edge one covers nothing
     low, spans, first, area = low[seen], (high - low)[seen], first[seen], area[seen, None]
-    # Weights of the second and third corner are linear in the pixel: slopes and the value at the low corner.
+    # Weights of the second and third corner are linear in the pixel: slopes and the value at the low
+    # corner.
     slopes = [
         np.stack([ac[seen, 1], -ac[seen, 0]], axis=1) / area,
         np.stack([-ab[seen, 1], ab[seen, 0]], axis=1) / area,
@@ -167,8 +168,8 @@ class SceneRollOuts:
     def chosen_frame(self, methods: Sequence[str], reference: str) -> tuple[int, str]:
         """Choose a frame that these methods have, and say why.
 
-        It is where the reference's inertia is largest, else the middle. The first fifth is left out, in which
-        a method may still be settling.
+        It is where the reference's inertia is largest, else the middle. The first fifth is left out, in
+        which a method may still be settling.
         """
         frames = min(self.series[method].frames for method in methods)
         inertia = self.series[reference].frame_fields.get(INERTIA) if reference in self.series else None
@@ -234,7 +235,9 @@ def failures(run: Run) -> Iterator[Drawing]:
             below.append(f"{number(strain)} J of strain,\n{number(ratio)} × the simulation's")
             shown[method] += 1
     if images:
-        caption = "The worst of trained networks by strain over the simulation's: each at its worst frame."
+        caption = (
+            "The worst of trained networks by strain over the simulation's: each at its worst frame."
+        )
         yield Drawing(sheet(images, tile, heads, below), "failures", caption, vector=False)
 
 
@@ -245,11 +248,16 @@ def worst_frame(cloth: Trajectory) -> int:
 
 
 def sheet(
-    images: Sequence[np.ndarray], tile: tuple[float, float], heads: Sequence[str], below: Sequence[str] = ()
+    images: Sequence[np.ndarray],
+    tile: tuple[float, float],
+    heads: Sequence[str],
+    below: Sequence[str] = (),
 ) -> Figure:
     """Compose pictures in a row, each of `tile` [inches], with texts over and below them."""
     wide, high = tile
-    top, under = (LINE * max((text.count("\n") + 1 for text in texts), default=0) for texts in (heads, below))
+    top, under = (
+        LINE * max((text.count("\n") + 1 for text in texts), default=0) for texts in (heads, below)
+    )
     width, height = wide * len(images), top + high + under
     figure = new_figure(width, height)
     figure.set_layout_engine("none")
@@ -271,7 +279,9 @@ def shots(
     cloths = [roll_outs.series[method] for method in methods]
     surfaces = [Surface(cloth.positions[frame], cloth.faces, CLOTH_COLOUR, LIFT) for cloth in cloths]
     body = roll_outs.body
-    skin = Surface(body.positions[frame], body.faces, BODY_COLOUR) if body and frame < body.frames else None
+    skin = (
+        Surface(body.positions[frame], body.faces, BODY_COLOUR) if body and frame < body.frames else None
+    )
     # A torn cloth would make all others small: the camera is the first one's.
     camera = camera_for([surfaces[0].positions], FRONT, tile[1] / tile[0])
     return views(skin, surfaces, camera, round(DOTS * tile[0]), round(DOTS * tile[1]))

@@ -92,7 +92,9 @@ def endings(run: Run) -> str:
     parts = []
     for kind, statuses in counted(run).items():
         bad = [f"{statuses[name]} {name}" for name in (*BAD, "skipped") if statuses[name]]
-        parts.append(f"of {sum(statuses.values()):,} {kind} {', '.join(bad) if bad else 'all ended well'}")
+        parts.append(
+            f"of {sum(statuses.values()):,} {kind} {', '.join(bad) if bad else 'all ended well'}"
+        )
     parts += [f"{len(run.problems)} files could not be read"] if run.problems else []
     text = "; ".join(parts)
     return f"{text[:1].upper()}{text[1:]}." if text else ""

@@ -33,7 +33,9 @@ def make_parser() -> argparse.ArgumentParser:
         epilog=f"{EXAMPLES}\n\n{GARMENT_WORDS}",
     )
     parser.add_argument("files", nargs="+", metavar="FILE", help="OBJ, PLY, STL or OFF")
-    parser.add_argument("--body", metavar="FILE", help="a body of your own (default: that of the package)")
+    parser.add_argument(
+        "--body", metavar="FILE", help="a body of your own (default: that of the package)"
+    )
     return parser
 
 

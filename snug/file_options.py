@@ -17,7 +17,9 @@ GARMENT_WORDS = """behind the path of a garment, as in shirt.obj,units=cm,up=z: 
 up (y, z), shift='0 0.1 0' [m] where the body stood elsewhere, rest=uv where the UV chart is the pattern,
 uv_scale (metres per unit of the chart), material (.toml of young_modulus [Pa], poisson_ratio,
 thickness [m], density [kg/m^3], bending_stiffness [J])"""
-MOTION_WORDS = """behind the path of motions, as in clips/,up=z: up (y, z), fps (of files that state none)"""
+MOTION_WORDS = (
+    """behind the path of motions, as in clips/,up=z: up (y, z), fps (of files that state none)"""
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -51,7 +53,9 @@ class GarmentFile:
         if len(self.shift) != 3 or not all(map(_is_number, self.shift)):
             raise ValueError(f"shift={self.shift}: give three numbers [m], as '0 0.1 0'")
         if self.uv_scale is not None and (self.rest != "uv" or not _is_number(self.uv_scale)):
-            raise ValueError(f"uv_scale={self.uv_scale}: is a number for a rest shape from UV: add rest=uv")
+            raise ValueError(
+                f"uv_scale={self.uv_scale}: is a number for a rest shape from UV: add rest=uv"
+            )
         if not re.fullmatch(r"\w[\w.+-]*", self.name):
             raise ValueError(
                 f"garment {self.path}: '{self.name}' cannot name scenes and networks: give the file a name "

@@ -38,8 +38,8 @@ class Kind:
         architecture: module in snug.networks and class of its network.
         sizes: further arguments of that class, as the number of handles.
         recipe: options of network and training, unless others are named.
-        targets: what teaches it: the `energies`, simulated `vertices`, or `bands` of their unposed offsets
-            (snug.training.simulated_data).
+        targets: what teaches it: the `energies`, simulated `vertices`, or `bands` of their unposed
+            offsets (snug.training.simulated_data).
         static: whether it knows single frames alone, so that no inertia is in its loss.
         fitted: whether it is fitted in one go, in place of training steps (snug.networks.fitted).
         closed_form: whether it trains faster by snug.kernels.gru.

@@ -10,12 +10,12 @@ from dataclasses import replace
 
 from snug.recipe import DEFAULT, TERMS, Recipe, RecipeError
 
-# docs/method.md lists where it departs from the text by no option. Contact is taken to cached points of the
-# skin, for searching all 48 frames of a step would take several times as long as the rest of it. Hinges are
-# scaled, as the authors have since corrected the text: every network is evaluated with scaled hinges, and
-# trained on printed ones its row would mix the recipe with another cloth (see `printed-bending` below). Their
-# constant of contact is of a vertex; it is taken per area of the garment at the paper's number of vertices,
-# so that a coarser mesh is not softer.
+# docs/method.md lists where it departs from the text by no option. Contact is taken to cached points of
+# the skin, for searching all 48 frames of a step would take several times as long as the rest of it.
+# Hinges are scaled, as the authors have since corrected the text: every network is evaluated with scaled
+# hinges, and trained on printed ones its row would mix the recipe with another cloth (see
+# `printed-bending` below). Their constant of contact is of a vertex; it is taken per area of the garment
+# at the paper's number of vertices, so that a coarser mesh is not softer.
 PAPER = Recipe(
     name="paper",
     pose_input="axis_angle",
@@ -40,9 +40,9 @@ PAPER_CONTACT = replace(
     PAPER, name="paper-contact", contact_samples="all", contact_stiffness=None, contact_margin=None
 )
 # Vertices of a simulation depend on more than two frames before: longer windows follow them better (7 mm
-# instead of 13 on the training motions at 500 vertices), and there is no energy that a window could exploit.
-# A rate of 1e-3: as near to the simulation on three held-out motions as with 2e-3, with less energy by each
-# of three seeds (docs/notebook/training.md). Without decay the error is 0.6 mm larger.
+# instead of 13 on the training motions at 500 vertices), and there is no energy that a window could
+# exploit. A rate of 1e-3: as near to the simulation on three held-out motions as with 2e-3, with less
+# energy by each of three seeds (docs/notebook/training.md). Without decay the error is 0.6 mm larger.
 SUPERVISED = replace(
     DEFAULT,
     name="supervised",
@@ -56,8 +56,9 @@ SUPERVISED = replace(
 )
 # A constant shape needs no recurrence of its own: the fit is a mean drape, see santesteban2019.
 SANTESTEBAN2019 = replace(SUPERVISED, name="santesteban2019", learning_rate=5e-4)
-# One frame knows nothing of its past, so windows of one; Adam and batch as its authors train it. Their rate,
-# 1e-4 and constant, was worse on held-out motions, by energies and by distance (docs/notebook/training.md).
+# One frame knows nothing of its past, so windows of one; Adam and batch as its authors train it. Their
+# rate, 1e-4 and constant, was worse on held-out motions, by energies and by distance
+# (docs/notebook/training.md).
 TAILORNET = replace(
     SUPERVISED,
     name="tailornet",
@@ -71,12 +72,14 @@ TAILORNET = replace(
 # Offsets as they are; everything else of a recipe is of steps, which these have not.
 NEAREST_POSES = replace(TAILORNET, name="nearest-poses")
 POSE_REGRESSION = replace(TAILORNET, name="pose-regression")
-# Twice the default's rate: at the default's the relative excess on validation motions was larger by a fifth.
+# Twice the default's rate: at the default's the relative excess on validation motions was larger by a
+# fifth.
 PBNS = replace(DEFAULT, name="pbns", learning_rate=2e-3)
 # The default as it is: no rate was searched for.
 HANDLES = replace(DEFAULT, name="handles")
 # As its authors train it: inertia about a detached past, first states of zero half a second before, Adam
-# without decay, batches of 32 windows. All else is the default's: rates that fall, the start, mixed motions.
+# without decay, batches of 32 windows. All else is the default's: rates that fall, the start, mixed
+# motions.
 NCS = replace(
     DEFAULT,
     name="ncs",
@@ -93,9 +96,9 @@ def _without(term: str) -> Recipe:
     return replace(DEFAULT, name=f"no-{term}", terms=tuple(name for name in TERMS if name != term))
 
 
-# Longer windows get smaller batches, so that a step sees 48 frames in each. Bodies of other shapes: with all
-# augmented clips on them the excess over the simulation on the mean body was 0.052 J, with half 0.033,
-# without 0.027 (docs/notebook/simulator.md).
+# Longer windows get smaller batches, so that a step sees 48 frames in each. Bodies of other shapes: with
+# all augmented clips on them the excess over the simulation on the mean body was 0.052 J, with half
+# 0.033, without 0.027 (docs/notebook/simulator.md).
 ABLATIONS = (
     replace(DEFAULT, name="shapes", shape_range=3.0, shape_of="clip", shape_share=0.5),
     *(_without(term) for term in TERMS),
@@ -108,7 +111,9 @@ ABLATIONS = (
     replace(DEFAULT, name="springs", material="springs"),
     replace(DEFAULT, name="printed-bending", bending="none"),
 )
-RECIPES = {recipe.name: recipe for recipe in (DEFAULT, PAPER, PAPER_CONTACT, PBNS, PBNS_SPRINGS, *ABLATIONS)}
+RECIPES = {
+    recipe.name: recipe for recipe in (DEFAULT, PAPER, PAPER_CONTACT, PBNS, PBNS_SPRINGS, *ABLATIONS)
+}
 
 
 def find_recipe(name: str) -> Recipe:

@@ -1,7 +1,7 @@
 """Recipe: every choice of a training run in one frozen place. The named ones are in snug.named_recipes.
 
-No recipe holds a balancing weight between the energies: there is none. `Recipe.terms` names any energy that
-`find_energy` knows. Imports nothing heavy, so that a command can list recipes without loading torch.
+No recipe holds a balancing weight between the energies: there is none. `Recipe.terms` names any energy
+that `find_energy` knows. Imports nothing heavy, so that a command can list recipes without loading torch.
 """
 
 from __future__ import annotations
@@ -29,9 +29,9 @@ class Recipe:
 
     Attributes:
         name: shown in tables.
-        pose_input: `six` (two columns of each joint's rotation matrix, the root by its up direction alone, so
-            that the direction a person walks in does not matter) or `axis_angle` (the 72 numbers of the
-            pose).
+        pose_input: `six` (two columns of each joint's rotation matrix, the root by its up direction
+            alone, so that the direction a person walks in does not matter) or `axis_angle` (the 72
+            numbers of the pose).
         velocity_frame: axes of the root velocity, `root` or `world`.
         smoothing: sweeps of neighbour averaging over the borrowed skinning weights, at 1000 vertices (see
             DressedBody.weights).
@@ -60,22 +60,24 @@ class Recipe:
             augmented `clip` once, while original motions stay on the mean body.
         shape_share: share of these clips that leave the mean body.
         contact_samples: `all` (vertices, edge midpoints, centroids) or `vertices`.
-        contact_stiffness: of ContactPenalty, per area of cloth [J/m^5]; None takes the simulator's default.
+        contact_stiffness: of ContactPenalty, per area of cloth [J/m^5]; None takes the simulator's
+            default.
         contact_margin: of ContactPenalty; None takes the simulator's default.
         mixed: frames of augmented motions (snug.training.augmentation) for each frame of a
             training motion, up to 20,000; not for networks that learn simulated vertices.
         terms: energies in the loss, TERMS or any other that `find_energy` knows.
         inertia_form: `equation_5` (the inertia of each frame with two before it in its window, through
             which its gradient reaches all three), `detached_past` (the same without a gradient to the two
-            frames before, as in Neural Cloth Simulation and GAPS) or `two_transitions` (the published code of
-            SNUG's authors: the second frame has an inertia too, about a cloth that stood still before it).
-        material: `stvk`, `springs` (mass-spring edges in place of the StVK membrane, all else the same) or
-            `pbns` (edges, hinges, uniform mass and squared contact of PBNS, see
+            frames before, as in Neural Cloth Simulation and GAPS) or `two_transitions` (the published
+            code of SNUG's authors: the second frame has an inertia too, about a cloth that stood still
+            before it).
+        material: `stvk`, `springs` (mass-spring edges in place of the StVK membrane, all else the same)
+            or `pbns` (edges, hinges, uniform mass and squared contact of PBNS, see
             snug.training.physics_loss, with its own stiffness and margin of contact).
         bending: scaling of the hinges, as BendHinge has it: `length_area`, or `none` as the paper prints
             them; without effect with material `pbns`.
-        spike: a window above this many joules a frame is named and counted, and its step's gradient clipped;
-            further measures: see snug.training.divergence_guard.
+        spike: a window above this many joules a frame is named and counted, and its step's gradient
+            clipped; further measures: see snug.training.divergence_guard.
     """
 
     name: str = "default"
@@ -121,12 +123,16 @@ class Recipe:
             ("shape_of", ("window", "clip")),
         ):
             if getattr(self, option) not in allowed:
-                raise RecipeError(f"recipe option {option}={getattr(self, option)!r}: use one of {allowed}")
+                raise RecipeError(
+                    f"recipe option {option}={getattr(self, option)!r}: use one of {allowed}"
+                )
         for term in (name for name in self.terms if name not in TERMS):
             try:
                 find_energy(term)
             except ValueError as error:
-                raise RecipeError(f"recipe option terms: {error}; the recipes here have {TERMS}") from error
+                raise RecipeError(
+                    f"recipe option terms: {error}; the recipes here have {TERMS}"
+                ) from error
         if min(self.window, self.batch, self.window_stride, self.even) < 1:
             raise RecipeError("recipe options window, batch, window_stride and even must be at least 1")
         if "inertia" in self.terms and self.window < 3:
@@ -162,8 +168,8 @@ def find_energy(name: str) -> Callable[..., Energy]:
 
     Raises:
         ValueError: an unknown name, one that two have, or an energy that cannot be trained: it is made of
-            more than a cloth, must be prepared for each step of a simulation (Energy.prepare), or finds its
-            stencils anew as vertices move (Energy.dynamic).
+            more than a cloth, must be prepared for each step of a simulation (Energy.prepare), or finds
+            its stencils anew as vertices move (Energy.dynamic).
 
     >>> find_energy("gravity").__name__
     'Gravity'

@@ -60,9 +60,19 @@ def parse_options(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         help=f"{garments}, or a mesh made for the body (default: %(default)s)")  # fmt: skip
     add("--vertices", type=int, default=1000, help="of a garment (default: %(default)s)")
     add("--body", metavar="FILE", help="your own body of SMPL's family, .npz or .pkl")
-    add("--motions", metavar="PATH", help="a motion file or a folder of them (default: the embedded library)")
+    add(
+        "--motions",
+        metavar="PATH",
+        help="a motion file or a folder of them (default: the embedded library)",
+    )
     add("--dataset", metavar="FILE", help="a file of simulated motions")
-    add("--hold-out", metavar="NAME", action="append", default=[], help="leave a motion out; may be repeated")
+    add(
+        "--hold-out",
+        metavar="NAME",
+        action="append",
+        default=[],
+        help="leave a motion out; may be repeated",
+    )
     add("--validation", metavar="NAME", action="append", default=[],
         help="roll this motion out now and then: one held out of training, or of the library a validation "
         "motion or one without a role; may be repeated. The weights that do best are kept")  # fmt: skip

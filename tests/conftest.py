@@ -22,7 +22,8 @@ def pytest_collection_finish() -> None:
 def refused(capsys, tmp_path) -> Callable[..., str]:
     """A check that a command refuses: one line of error, status 2, and `tmp_path` as it was.
 
-    `refused(hint, main, *arguments)` calls main(*arguments), wants `hint` in the line, and returns the line.
+    `refused(hint, main, *arguments)` calls main(*arguments), wants `hint` in the line, and returns the
+    line.
     """
 
     def check(hint: str, main: Callable[..., int], *arguments: Any) -> str:

@@ -8,9 +8,10 @@
 | `.pc2`, `.pc16` | point cache, as Neural Cloth Simulation writes it; faces of the `.obj` of the same name |
 | folder, pattern | one mesh a frame (`.obj`, `.ply` and others), in the order of the numbers in their names |
 
-What a file declares of its size is compared with the file before anything of that size is allocated. Nothing
-is executed. A roll-out that does not fit its scene, in unit, axes, order of vertices, frame rate or place, is
-refused with the remedy: in centimetres it would get numbers, and nobody would see that they mean nothing.
+What a file declares of its size is compared with the file before anything of that size is allocated.
+Nothing is executed. A roll-out that does not fit its scene, in unit, axes, order of vertices, frame rate
+or place, is refused with the remedy: in centimetres it would get numbers, and nobody would see that they
+mean nothing.
 """
 
 from __future__ import annotations
@@ -123,7 +124,9 @@ def read_roll_out(path: str | Path) -> StoredRollOut:
         )
     try:
         return _checked(_READERS.get(suffix, _meshes)(path))
-    except Exception as error:  # a damaged file can fail in nearly every way, and none is this program's own
+    except (
+        Exception
+    ) as error:  # a damaged file can fail in nearly every way, and none is this program's own
         why = " ".join(str(error).split())[:300] or type(error).__name__
         raise RollOutFileError(why if path in why else f"{path}: {why}") from None
 
@@ -132,7 +135,9 @@ def _checked(arrays: Mapping[str, Any]) -> StoredRollOut:
     """Return the arrays, their shapes compared. Raises ValueError, without the file's name."""
     given = {name: np.asarray(array) for name, array in arrays.items() if array is not None}
     if "positions" not in given:
-        raise ValueError("holds no positions (T,V,3): name them 'positions' in an npz, 'pred' in a pickle")
+        raise ValueError(
+            "holds no positions (T,V,3): name them 'positions' in an npz, 'pred' in a pickle"
+        )
     known = {name: _floats(name, given[name]) for name in OVER_TIME if name in given}
     shape = known["positions"].shape
     for name, array in known.items():
@@ -249,9 +254,9 @@ def fit_to_scene(
 def _check_place(positions: np.ndarray, expected: np.ndarray, *, ordered: bool) -> None:
     """Raise RollOutFileError unless the cloth (T,V,3) [m] starts at the expected place and goes its way.
 
-    Another unit, axis or order of vertices, a mirrored world and another motion are far from it. A roll-out
-    that explodes in the end is a result: the way counts in most of the frames. Of another mesh the bounding
-    boxes are compared.
+    Another unit, axis or order of vertices, a mirrored world and another motion are far from it. A
+    roll-out that explodes in the end is a result: the way counts in most of the frames. Of another mesh
+    the bounding boxes are compared.
     """
     first, size = positions[0], float(np.linalg.norm(np.ptp(expected[0], axis=0)))
     if not np.isfinite(first).all():
@@ -259,7 +264,9 @@ def _check_place(positions: np.ndarray, expected: np.ndarray, *, ordered: bool) 
     if ordered:
         apart = float(np.median(np.linalg.norm(first - expected[0], axis=1)))
     else:
-        apart = max(np.abs(end(first, axis=0) - end(expected[0], axis=0)).max() for end in (np.min, np.max))
+        apart = max(
+            np.abs(end(first, axis=0) - end(expected[0], axis=0)).max() for end in (np.min, np.max)
+        )
     if not apart <= FIRST * size:
         across = float(np.linalg.norm(np.ptp(first, axis=0)))
         raise RollOutFileError(

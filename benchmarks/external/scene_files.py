@@ -147,7 +147,9 @@ def facts_of(scene: BuiltScene) -> dict[str, Any]:
         "warm_up_frames": scene.warm_up,
         "vertices": scene.cloth.vertex_count,
         "triangles": len(scene.cloth.faces),
-        "before": 0 if scene.dressed is None or scene.dressed.before is None else scene.dressed.before.frames,
+        "before": 0
+        if scene.dressed is None or scene.dressed.before is None
+        else scene.dressed.before.frames,
         "gravity": [0.0, -GRAVITY, 0.0],
         "material": asdict(material)
         | {"lame_lambda_N_per_m": material.lame_lambda, "lame_mu_N_per_m": material.lame_mu},

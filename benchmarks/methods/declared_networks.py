@@ -52,7 +52,9 @@ def network(
         "role": "network",
         "reporting": Reporting(base=base, pairing_group=pairing_group or name),
     }
-    return MethodEntry(name=name, label=label or KINDS[name].label, description=description, **usual | fields)
+    return MethodEntry(
+        name=name, label=label or KINDS[name].label, description=description, **usual | fields
+    )
 
 
 COUNTS = (20, 40, 80)  # of handles
@@ -176,8 +178,9 @@ def _equal_data(name: str, label: str, mixed: int, *, converged: bool = False) -
     """Declare a network on equal data, with `mixed` augmented frames for each given one.
 
     The last training motion is held out. With every seed a network that simulated vertices teach gets the
-    same clips, simulated once; another mixes as many anew. Both have SNUG's number of steps or go on until
-    the held-out motion gets no better. Not timed: its run time is that of the network of the usual data.
+    same clips, simulated once; another mixes as many anew. Both have SNUG's number of steps or go on
+    until the held-out motion gets no better. Not timed: its run time is that of the network of the usual
+    data.
     """
     usual = TRAININGS[name]
     recipe = replace(usual.recipe, name=f"{usual.recipe.name}-data-{mixed}")

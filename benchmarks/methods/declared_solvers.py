@@ -98,7 +98,8 @@ SOLVERS = (
         "refrozen", ", planes searched twice",
         ", each step solved again with contact planes searched at its end", "refrozen", refreeze=1,
     ),
-    # All negative curvature is taken out at once: moving cloth needs that in nearly every first iteration.
+    # All negative curvature is taken out at once: moving cloth needs that in nearly every first
+    # iteration.
     *_truncated(
         "newton", "Newton", "iteration", "Newton's method on the true Hessian, stopped after {} a step",
         (1, 2, 4, 8), method="newton", start_projected=True,

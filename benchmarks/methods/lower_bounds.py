@@ -2,18 +2,19 @@
 
 Vertices of a whole clip are optimised under the training loss, without a network,
 
-    min over x_1 ... x_T of  sum_t [strain + bending + gravity + collision](x_t) + sum_{t >= 3} inertia(x_t)
-    inertia(x_t) = sum_v m_v / (2 dt^2) |x_t - 2 x_{t-1} + x_{t-2}|^2
+    min over x_1 ... x_T of  sum_t [strain + bending + gravity + collision](x_t) + sum_{t >= 3}
+    inertia(x_t) inertia(x_t) = sum_v m_v / (2 dt^2) |x_t - 2 x_{t-1} + x_{t-2}|^2
 
-which a network could reach whose output were not bound to its input. All frames are one cloth of T copies,
-minimised by L-BFGS on the very terms that judge every method. Contact planes are frozen for a round and then
-searched anew. The sum is not convex: a bound found from skinning, not proven to be the lowest. Its time a
-frame is that of the whole clip divided by its frames.
+which a network could reach whose output were not bound to its input. All frames are one cloth of T
+copies, minimised by L-BFGS on the very terms that judge every method. Contact planes are frozen for a
+round and then searched anew. The sum is not convex: a bound found from skinning, not proven to be the
+lowest. Its time a frame is that of the whole clip divided by its frames.
 
-The floor of a subspace is the simulation, from its own past and with its own contact planes, whose cloth can
-only do what the subspace expresses: handles, or all that the last layer of a network can give,
+The floor of a subspace is the simulation, from its own past and with its own contact planes, whose cloth
+can only do what the subspace expresses: handles, or all that the last layer of a network can give,
 
-    x_v(q) = M_v (r_v + m_v + sum_k U_vk q_k)       M: skinning, r: the unposed garment, m + U q: its offsets
+    x_v(q) = M_v (r_v + m_v + sum_k U_vk q_k)       M: skinning, r: the unposed garment, m + U q: its
+    offsets
 
 So the excess of a network over the reference splits into the floor's, which no training removes, and the
 rest, which its training has not learned; that may be negative where cloth is chaotic.
@@ -61,7 +62,9 @@ class ClipInertia(Inertia):
         super().__init__(cloth, dt)
         self.frames = frames
 
-    def value_and_gradient(self, x: np.ndarray, x_hat: np.ndarray | None = None) -> tuple[float, np.ndarray]:
+    def value_and_gradient(
+        self, x: np.ndarray, x_hat: np.ndarray | None = None
+    ) -> tuple[float, np.ndarray]:
         """Return the inertia of the whole clip [J] and its gradient at x (T V, 3)."""
         clip = x.reshape(self.frames, -1, 3)
         masses = self.masses.reshape(self.frames, -1, 1)[2:] / self.dt**2
@@ -117,7 +120,12 @@ class DirectOptimisation(Method):
         self.sums: list[float] = []
         potential = Potential(self.terms)
         descent = make_minimiser(
-            potential, "lbfgs", finish=False, max_iterations=ITERATIONS, memory=MEMORY, tolerance=TOLERANCE
+            potential,
+            "lbfgs",
+            finish=False,
+            max_iterations=ITERATIONS,
+            memory=MEMORY,
+            tolerance=TOLERANCE,
         )
         status, reason = "stalled", f"the sum was still falling after {ROUNDS} rounds"
         for number in range(1, ROUNDS + 1):

@@ -4,9 +4,10 @@ Collision post-processing pushes vertices below or within 2 mm of the skin out t
 
     x' = x + max(2 mm - n.(x - c), 0) n      c: closest body point that x may touch, n: the skin's normal
 
-The released SNUG models and Santesteban 2019 end with such a step, so numbers from them are post-processed.
-Here it is a method of its own, and its time is on that method's clock. One push for each vertex, none for
-edges and faces: where skin is hollow a vertex may end nearer, and a long edge may still cut the body.
+The released SNUG models and Santesteban 2019 end with such a step, so numbers from them are
+post-processed. Here it is a method of its own, and its time is on that method's clock. One push for each
+vertex, none for edges and faces: where skin is hollow a vertex may end nearer, and a long edge may still
+cut the body.
 """
 
 from __future__ import annotations
@@ -71,8 +72,8 @@ class CollisionPostProcessing:
 class Network(Method):
     """Network read from its file; without one skinning, smoothed as much as in the networks' default recipe.
 
-    Features and joint transforms are made and the network is warmed up before run(). cleanup: whether each
-    frame is post-processed; the body is then posed before run() too.
+    Features and joint transforms are made and the network is warmed up before run(). cleanup: whether
+    each frame is post-processed; the body is then posed before run() too.
     """
 
     path: Path | None = None

@@ -1,8 +1,8 @@
 """Methods from outside: stored roll-outs, and programs with their own environment.
 
-A program reads an exported scene and writes a roll-out. Its start, its imports and its files are no work of
-the method, so the harness's clock says nothing of it. A time that it writes beside the positions is reported,
-and marked as declared.
+A program reads an exported scene and writes a roll-out. Its start, its imports and its files are no work
+of the method, so the harness's clock says nothing of it. A time that it writes beside the positions is
+reported, and marked as declared.
 """
 
 from __future__ import annotations
@@ -68,7 +68,9 @@ class Stored(Method):
         stored, bad = self.stored, np.argwhere(~np.isfinite(positions).all(axis=-1))
         where = f"frame {bad[0, 0]}, vertex {bad[0, 1]}" if len(bad) else ""
         # Whoever claims nothing is held to nothing where a frame that claims to have converged is judged.
-        claims = np.zeros(len(positions)) if stored.converged is None else stored.converged[: len(positions)]
+        claims = (
+            np.zeros(len(positions)) if stored.converged is None else stored.converged[: len(positions)]
+        )
         return Trajectory(
             positions=positions,
             faces=np.asarray(stored.faces if self.other_mesh else self.scene.cloth.faces),
@@ -122,8 +124,8 @@ def program(
     Args:
         name: of the method.
         command: words as in a shell, which is not used. {scene} becomes the folder of the exported scene,
-            {out} the npz file to be written: positions (T,V,3) [m], and what else benchmarks.score reads. In
-            it seconds_per_frame, one number, is its declared time. {seed} becomes the seed.
+            {out} the npz file to be written: positions (T,V,3) [m], and what else benchmarks.score reads.
+            In it seconds_per_frame, one number, is its declared time. {seed} becomes the seed.
         seconds: after which it is ended.
         description: one line; by default that it is this program.
         fields: of MethodEntry, as label, files and needs_body.

@@ -1,9 +1,10 @@
 """Own energies of a method: those that its network was trained on, and the simulation that minimises them.
 
-A network is as well trained as it comes near to the minimum of its own loss. So beside the energies of the
-scene, which are the same for all methods, each is measured by its own ones, against the simulation that has
-exactly these: the recipe's material, hinges, contact constants and terms. A network of single frames, or one
-trained without inertia, has no dynamics in its loss: its minimum is the quasi-static solution of each frame.
+A network is as well trained as it comes near to the minimum of its own loss. So beside the energies of
+the scene, which are the same for all methods, each is measured by its own ones, against the simulation
+that has exactly these: the recipe's material, hinges, contact constants and terms. A network of single
+frames, or one trained without inertia, has no dynamics in its loss: its minimum is the quasi-static
+solution of each frame.
 """
 
 from __future__ import annotations
@@ -62,7 +63,8 @@ def is_own_reference(entry: MethodEntry) -> bool:
 def own_reference(entry: MethodEntry) -> MethodEntry | None:
     """Return the simulation of a method's own energies; None where these are the scene's, or have no minimum.
 
-    Nor is there one of the scene's energies without inertia: the quasi-static solution of the scene is that.
+    Nor is there one of the scene's energies without inertia: the quasi-static solution of the scene is
+    that.
     """
     own = own_energies(entry)
     if own in (None, DEFAULT, STATIC) or is_own_reference(entry):

@@ -15,9 +15,9 @@ from benchmarks.scene import BuiltScene
 from reference_sim.time_loop import TimeStepper
 from reference_sim.trajectory import Trajectory
 
-# Options of quasi-static solutions. With this time step [s] and no velocities inertia weighs a thousandth of
-# what it weighs in a frame: a hem that swings once in a second comes within 3 % of its static place, and
-# there is still one minimum to go to. The tolerance [mean vertex weights] is for hems in millimetres.
+# Options of quasi-static solutions. With this time step [s] and no velocities inertia weighs a thousandth
+# of what it weighs in a frame: a hem that swings once in a second comes within 3 % of its static place,
+# and there is still one minimum to go to. The tolerance [mean vertex weights] is for hems in millimetres.
 STATIC: dict[str, Any] = {"dt": 1.0, "quasi_static": True, "tolerance": 1e-4}
 
 
@@ -68,7 +68,9 @@ class Simulation(Method):
             pin_positions=scene.pin_positions,
             progress=progress,
         )
-        return replace(trajectory, times=scene.dt * np.arange(float(trajectory.frames)))  # also of slow steps
+        return replace(
+            trajectory, times=scene.dt * np.arange(float(trajectory.frames))
+        )  # also of slow steps
 
 
 def make_simulation(*, models: Path, seed: int, **options: Any) -> Simulation:

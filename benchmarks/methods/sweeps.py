@@ -1,14 +1,14 @@
 """Vertex block descent and XPBD: solvers that sweep over a mesh a given number of times.
 
-One sweep of vertex block descent (Chen et al. 2024) visits the free vertices one after the other. Each takes
-a Newton step of its own three coordinates, all others held still:
+One sweep of vertex block descent (Chen et al. 2024) visits the free vertices one after the other. Each
+takes a Newton step of its own three coordinates, all others held still:
 
     x_i <- x_i - H_ii^-1 g_i,    g_i, H_ii: gradient and 3 x 3 block of the whole step's potential
 
 with H_ii made positive definite as in the simulator (compressive stress and the hinge's second derivative
 left out), so its stationary points are Newton's. On one core a sweep in the order of the mesh needs no
-colours. As in the paper there is no line search; its guess and its Chebyshev acceleration are left out: all
-solvers start alike here.
+colours. As in the paper there is no line search; its guess and its Chebyshev acceleration are left out:
+all solvers start alike here.
 
 Extended position-based dynamics (Macklin et al. 2016) has constraints whose energies are ours, exactly.
 Each element is a constraint C(x) (a vector for the membrane) with energy C . K C / 2:
@@ -17,14 +17,14 @@ Each element is a constraint C(x) (a vector for the membrane) with energy C . K 
     bending     C = theta - theta_0,  K = k
     collision   C = depth^(3/2),      K = 2 k a_s
 
-The weight is in the predicted positions x_hat + dt^2 g, where a step starts. A sweep solves one constraint
-after the other:
+The weight is in the predicted positions x_hat + dt^2 g, where a step starts. A sweep solves one
+constraint after the other:
 
     (grad C M^-1 grad C^T + K^-1/dt^2) dlam = -C - K^-1/dt^2 lam,    x += M^-1 grad C^T dlam
 
 It minimises the potential where C is linear in x. Elsewhere its limit for many sweeps is another
-configuration: it obeys lam = -dt^2 K C, but the momentum equation only as far as grad C did not turn on the
-way from the prediction.
+configuration: it obeys lam = -dt^2 K C, but the momentum equation only as far as grad C did not turn on
+the way from the prediction.
 """
 
 from __future__ import annotations
@@ -135,7 +135,11 @@ class VertexBlockDescent(SweepSolver):
         self._free = np.flatnonzero(potential.cloth.free)
         vertices = potential.cloth.vertex_count
         self._blocks = [
-            (kernel_argument(blocks.kernel), incidence(blocks.stencils, blocks.used, vertices), blocks.freeze)
+            (
+                kernel_argument(blocks.kernel),
+                incidence(blocks.stencils, blocks.used, vertices),
+                blocks.freeze,
+            )
             for blocks in self._terms.kernels
         ]
 

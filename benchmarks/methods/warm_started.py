@@ -1,12 +1,13 @@
 """Solvers that begin each step at the frame of a network or of skinning, then take a few iterations.
 
-The state is carried: x_hat comes from the method's own two previous frames, so that inertia acts, while the
-network sees what it always sees. Contact planes are frozen at the first guess, as for every solver. The time
-of the network or of skinning is that of run(); posed body, features and joint transforms are ready before.
+The state is carried: x_hat comes from the method's own two previous frames, so that inertia acts, while
+the network sees what it always sees. Contact planes are frozen at the first guess, as for every solver.
+The time of the network or of skinning is that of run(); posed body, features and joint transforms are
+ready before.
 
-A network's error changes slowly: cloth that it puts too deep, or hangs too stiffly, is so in the next frame
-too. So the first guess may be the network's frame and a share of what the solver added to the last one,
-turned as skinning turns the vertex.
+A network's error changes slowly: cloth that it puts too deep, or hangs too stiffly, is so in the next
+frame too. So the first guess may be the network's frame and a share of what the solver added to the last
+one, turned as skinning turns the vertex.
 """
 
 from __future__ import annotations
@@ -81,9 +82,9 @@ def given_frames(
 ) -> Callable[[int, np.ndarray], np.ndarray]:
     """Return the function of step and x (V, 3) [m] that gives the first guess (V, 3) [m] of a step from x.
 
-    Steps are asked for in turn, from 1, where `start` begins the frames anew. With `carry`, SHARE of the last
-    frame's residual, carried by the skin, is added to each. The residual is what the solver added to the
-    frame before: where the step starts, less the frame given there.
+    Steps are asked for in turn, from 1, where `start` begins the frames anew. With `carry`, SHARE of the
+    last frame's residual, carried by the skin, is added to each. The residual is what the solver added to
+    the frame before: where the step starts, less the frame given there.
     """
     frames: Iterator[np.ndarray]
     given = np.zeros((0, 3))
@@ -103,8 +104,8 @@ def given_frames(
 class WarmStarted(Simulation):
     """Simulation whose steps start at frames of a network or of skinning and are cut short.
 
-    guess: name of the network, whose file is `path`, or SKINNING. solver: options of the minimiser that goes
-    on from there. residual: whether the last frame's residual is carried.
+    guess: name of the network, whose file is `path`, or SKINNING. solver: options of the minimiser that
+    goes on from there. residual: whether the last frame's residual is carried.
     """
 
     guess: str
@@ -143,13 +144,18 @@ class WarmStarted(Simulation):
         return ResidualTransport(dressed.weights(DEFAULT.smoothing), transforms)
 
 
-def make_warm_started(*, models: Path, seed: int, guess: str, solver: str, iterations: int) -> WarmStarted:
+def make_warm_started(
+    *, models: Path, seed: int, guess: str, solver: str, iterations: int
+) -> WarmStarted:
     """Make `iterations` of "newton", "lbfgs" or "fast-lbfgs" from the network `guess`, or from "skinning".
 
     With "fast-lbfgs" the last residual is carried.
     """
     fast = solver == "fast-lbfgs"
-    of_solver: dict[str, Any] = {"method": CompiledLBFGS if fast else solver, "max_iterations": iterations}
+    of_solver: dict[str, Any] = {
+        "method": CompiledLBFGS if fast else solver,
+        "max_iterations": iterations,
+    }
     if not fast:
         of_solver |= {"finish": False} if solver == "lbfgs" else {"start_projected": True}
     path = model_path(models, guess, seed)

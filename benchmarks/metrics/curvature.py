@@ -135,7 +135,9 @@ class CurvatureSeries:
 def curvature_series(positions: Positions, faces: Faces) -> CurvatureSeries:
     """Return curvature and areas of every frame."""
     frames = [mean_curvature(x, faces) for x in positions]
-    curvature, area = (np.array([pair[k] for pair in frames]).reshape(positions.shape[:2]) for k in (0, 1))
+    curvature, area = (
+        np.array([pair[k] for pair in frames]).reshape(positions.shape[:2]) for k in (0, 1)
+    )
     area[:, boundary_mask(faces, positions.shape[1])] = 0.0
     return CurvatureSeries(curvature, area)
 

@@ -68,7 +68,9 @@ def hem_yaw(hem: Array, axes: Array) -> Array:
     hem: (T,H,3) in the root's axes; axes: (T,3,3) root to world.
     """
     world = np.einsum("tij,tvj->tvi", axes, hem)
-    flat = (world - world.mean(axis=1, keepdims=True))[..., [2, 0]]  # z, x: the yaw is positive from z to x
+    flat = (world - world.mean(axis=1, keepdims=True))[
+        ..., [2, 0]
+    ]  # z, x: the yaw is positive from z to x
     z = flat[..., 0] + 1j * flat[..., 1]
     # The rotation about the centroid nearest to frame 0's shape in the sense of least squares.
     return np.unwrap(np.angle((z * z[0].conj()).sum(axis=1)))
@@ -77,8 +79,9 @@ def hem_yaw(hem: Array, axes: Array) -> Array:
 def gain_and_lag(moving: Array, static: Array) -> tuple[float, float]:
     """Return g and l [frames] for which g static(t - l) fits moving(t), both (T,) less their means.
 
-    Lags within MAX_LAG are tried in hundredths of a frame by linear interpolation; before its first frame a
-    signal rests. Where no lag has a gain above 0, as of a hem that rests, the gain is 0 and the lag nan.
+    Lags within MAX_LAG are tried in hundredths of a frame by linear interpolation; before its first frame
+    a signal rests. Where no lag has a gain above 0, as of a hem that rests, the gain is 0 and the lag
+    nan.
     """
     frames = np.arange(len(static), dtype=np.float64)
     moving = moving - moving.mean()

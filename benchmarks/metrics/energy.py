@@ -2,10 +2,11 @@
 
 Each method is judged on its own history: inertia compares a frame with the two before it in the same
 trajectory, and contact planes are searched at the method's own positions. A frame before the third has no
-two before it; it counts as moving freely, hence inertia 0 there. Means are over the frames after the warm-up.
+two before it; it counts as moving freely, hence inertia 0 there. Means are over the frames after the
+warm-up.
 
-`energy/bending_printed` is of the same hinges as the SNUG paper prints them, not scaled: papers of the field
-give one or the other under the same name. It is no part of the total.
+`energy/bending_printed` is of the same hinges as the SNUG paper prints them, not scaled: papers of the
+field give one or the other under the same name. It is no part of the total.
 """
 
 from __future__ import annotations
@@ -31,8 +32,8 @@ if TYPE_CHECKING:
 def copied_terms(scene: BuiltScene) -> list[Energy]:
     """Copy the terms that the scene declares, and inertia, to be prepared for one trajectory alone.
 
-    A term may remember the step before, and read another term: so all are copied together, and what one of
-    them knows of another is the other's copy. Arrays are shared with the scene's.
+    A term may remember the step before, and read another term: so all are copied together, and what one
+    of them knows of another is the other's copy. Arrays are shared with the scene's.
     """
     declared = (*scene.energies, Inertia(scene.cloth, scene.dt))
     twins = {id(term): copy.copy(term) for term in declared}
@@ -42,12 +43,16 @@ def copied_terms(scene: BuiltScene) -> list[Energy]:
 
 
 def freeze_step(
-    scene: BuiltScene, potential: Potential, positions: Positions, frame: int, guess: Vertices | None = None
+    scene: BuiltScene,
+    potential: Potential,
+    positions: Positions,
+    frame: int,
+    guess: Vertices | None = None,
 ) -> Vertices:
     """Freeze the potential of `copied_terms` for the step that ended at `frame`; return its first guess.
 
-    Any frame from 1 on may be jumped to: the step before is prepared first where a term remembers it. Contact
-    planes are searched at `guess`, by default the simulator's.
+    Any frame from 1 on may be jumped to: the step before is prepared first where a term remembers it.
+    Contact planes are searched at `guess`, by default the simulator's.
     """
     if frame > 1 and any(term.remembers for term in potential.energies):
         potential.prepare(step_to(scene, positions, frame - 1))
@@ -56,7 +61,9 @@ def freeze_step(
     return step.guess
 
 
-def step_to(scene: BuiltScene, positions: Positions, frame: int, *, guess: Vertices | None = None) -> Step:
+def step_to(
+    scene: BuiltScene, positions: Positions, frame: int, *, guess: Vertices | None = None
+) -> Step:
     """Return the step from frame - 1 to `frame`, as a solver is given it.
 
     A frame before the first counts as equal to it: the start is a step from rest.
@@ -98,7 +105,9 @@ def energy_series(scene: BuiltScene, trajectories: Sequence[Positions]) -> list[
     return tables
 
 
-def _terms_at(scene: BuiltScene, terms: Sequence[Energy], positions: Floats, frame: int) -> dict[str, float]:
+def _terms_at(
+    scene: BuiltScene, terms: Sequence[Energy], positions: Floats, frame: int
+) -> dict[str, float]:
     x = np.ascontiguousarray(positions[frame])
     step = step_to(scene, positions, frame, guess=x)
     values = {}

@@ -8,15 +8,16 @@ found from x_t, the one that lies below the frame. Over the judged frames
 
     gap        mean of Phi(x_t) - Phi* [J]
     local      mean of Phi(x_t) - Phi(y_t) [J]
-    relative   gap / scale,  scale = mean of Phi(x_s) - Phi(x_r) over steps of the reference simulation x_r
-    refrozen   the local gap where planes are frozen at x_t instead: what depends on where they are frozen
-    distance   mean of the root mean square distance of vertices between x_t and y_t [mm]
+    relative   gap / scale,  scale = mean of Phi(x_s) - Phi(x_r) over steps of the reference simulation
+    x_r refrozen   the local gap where planes are frozen at x_t instead: what depends on where they are
+    frozen distance   mean of the root mean square distance of vertices between x_t and y_t [mm]
     curvature  mean of |H(x_t) - H(y_t)| by the areas of y_t [1/m]
     norm       mean of the largest component of grad Phi(x_t), in mean vertex weights
 
 x_s is the garment skinned to the frame's pose or, where there is no body, the guess x_0. The scale is the
-same for every method of a scene. Each method is judged from its own history, which a chaotic roll-out cannot
-blur: a small gap says that a step was solved, not that the past was right; it does not measure dynamics.
+same for every method of a scene. Each method is judged from its own history, which a chaotic roll-out
+cannot blur: a small gap says that a step was solved, not that the past was right; it does not measure
+dynamics.
 """
 
 from __future__ import annotations
@@ -38,7 +39,9 @@ if TYPE_CHECKING:
     from benchmarks.scene import BuiltScene
     from reference_sim.potential import Potential
 
-ITERATIONS = 300  # of one minimisation: a limit by the clock would make a gap depend on how busy a machine is
+ITERATIONS = (
+    300  # of one minimisation: a limit by the clock would make a gap depend on how busy a machine is
+)
 PRECISION = 0.1  # standard error of the gap, as a share of it
 NEGLIGIBLE = 1e-6  # of the scale: a standard error below it is small enough however small the gap is
 MM = 1e3

@@ -30,7 +30,9 @@ def measure_triangles(roll_out: RollOut) -> dict[str, float]:
     from benchmarks.metrics.self_intersections import self_intersections  # loads numba
 
     faces = roll_out.scene.cloth.faces
-    frames = [self_intersections(np.ascontiguousarray(x), faces) for x in roll_out.positions[roll_out.judged]]
+    frames = [
+        self_intersections(np.ascontiguousarray(x), faces) for x in roll_out.positions[roll_out.judged]
+    ]
     return {
         "intersections/triangles": 100.0 * float(np.mean([hit.mean() for hit, _ in frames])),
         "intersections/contours": float(np.mean([length for _, length in frames])),
@@ -51,8 +53,8 @@ def measure_swept(roll_out: RollOut) -> dict[str, float]:
 def swept_crossings(before: Vertices, after: Vertices, faces: Faces) -> int | None:
     """Return how many pairs of primitives meet on the straight way from `before` to `after`; None if lost.
 
-    A pair without a common vertex counts once. A motion of all vertices together changes nothing. A cloth is
-    lost where a vertex moves by more than FARTHEST beside the others, or MOST_PAIRS are surpassed.
+    A pair without a common vertex counts once. A motion of all vertices together changes nothing. A cloth
+    is lost where a vertex moves by more than FARTHEST beside the others, or MOST_PAIRS are surpassed.
     """
     import ipctk
 

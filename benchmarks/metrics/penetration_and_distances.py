@@ -79,8 +79,8 @@ def rms(x: Positions, y: Positions) -> float:
 def distance_rms(positions: Positions, reference: Positions) -> Floats:
     """Return the root mean square distance between the same vertices of each frame, (T,) [m].
 
-    Two accurate solvers of one wrinkling step differ by centimetres, since it has several minima: read this
-    beside the spread between two references, never alone.
+    Two accurate solvers of one wrinkling step differ by centimetres, since it has several minima: read
+    this beside the spread between two references, never alone.
     """
     return np.sqrt(((positions - reference) ** 2).sum(2).mean(1))
 
@@ -97,8 +97,8 @@ class Penetration:
 class SurfaceSamples:
     """Points of a triangle mesh whose weights give integrals over its area.
 
-    The seven-point rule of degree 3 for triangles: vertices, midpoints of edges and centroid have weights of
-    1/20, 2/15 and 9/20 of a triangle's area, and integrals of cubic polynomials are exact.
+    The seven-point rule of degree 3 for triangles: vertices, midpoints of edges and centroid have weights
+    of 1/20, 2/15 and 9/20 of a triangle's area, and integrals of cubic polynomials are exact.
 
     >>> import numpy as np
     >>> x = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
@@ -122,7 +122,9 @@ class SurfaceSamples:
         sides = x[self.faces[:, 1:]] - x[self.faces[:, :1]]
         areas = 0.5 * np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
         of_vertices = np.bincount(self.faces.ravel(), np.repeat(areas / 20.0, 3), len(x))
-        of_edges = np.bincount(self.edges_of_faces.ravel(), np.repeat(areas * 2.0 / 15.0, 3), len(self.edges))
+        of_edges = np.bincount(
+            self.edges_of_faces.ravel(), np.repeat(areas * 2.0 / 15.0, 3), len(self.edges)
+        )
         return np.concatenate([of_vertices, of_edges, 0.45 * areas])
 
 
@@ -142,7 +144,9 @@ def penetration(
         present = [k for k, positions in enumerate(trajectories) if frame < len(positions)]
         points = [samples[k].points(trajectories[k][frame]) for k in present]
         distances = np.asarray(obstacle.signed_distance(np.concatenate(points), frame))
-        for k, distance in zip(present, np.split(distances, np.cumsum([len(each) for each in points])[:-1])):
+        for k, distance in zip(
+            present, np.split(distances, np.cumsum([len(each) for each in points])[:-1])
+        ):
             x, inside = trajectories[k][frame], distance < 0.0
             weights = samples[k].weights(x)
             penetrations[k].depth[frame] = np.maximum(0.0, -distance[: len(x)])

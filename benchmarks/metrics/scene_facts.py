@@ -59,7 +59,8 @@ def measure_body(roll_out: RollOut) -> dict[str, float]:
 def inside_itself(x: Vertices, faces: Faces) -> NDArray[np.bool_]:
     """Return which vertices of a closed surface are inside another part of it.
 
-    There the winding number of the surface around a point a little off the vertex, along its normal, is one.
+    There the winding number of the surface around a point a little off the vertex, along its normal, is
+    one.
     """
     from reference_sim.geometry.surface import vertex_normals, winding_numbers  # loads numba
 

@@ -1,8 +1,9 @@
 """Self-intersections of a cloth: triangles that pass through others of the same cloth.
 
-Two triangles without a common vertex intersect where an edge of one crosses the inside of the other. Pairs
-come from a sweep along x over bounding boxes. Triangles that touch in one plane count as apart. The line in
-which two triangles intersect ends at two such crossings; all lines together are the intersection contours.
+Two triangles without a common vertex intersect where an edge of one crosses the inside of the other.
+Pairs come from a sweep along x over bounding boxes. Triangles that touch in one plane count as apart. The
+line in which two triangles intersect ends at two such crossings; all lines together are the intersection
+contours.
 """
 
 from __future__ import annotations
@@ -83,7 +84,9 @@ def _crossings(x, edges_of, face, ends, crossings):
         if before * behind >= 0.0:
             continue
         first, second, third = _volume(x, p, q, a, b), _volume(x, p, q, b, c), _volume(x, p, q, c, a)
-        if (first > 0.0 and second > 0.0 and third > 0.0) or (first < 0.0 and second < 0.0 and third < 0.0):
+        if (first > 0.0 and second > 0.0 and third > 0.0) or (
+            first < 0.0 and second < 0.0 and third < 0.0
+        ):
             share = before / (before - behind)
             for axis in range(3):
                 ends[crossings, axis] = (1.0 - share) * x[p, axis] + share * x[q, axis]

@@ -1,13 +1,14 @@
 """Metrics surface/*: a roll-out against the reference as surfaces, whatever their vertices and triangles.
 
-With d the distance from a vertex to the nearest point of the other surface, and theta the angle between the
-normals there, both weighted by a third of the triangles around the vertex,
+With d the distance from a vertex to the nearest point of the other surface, and theta the angle between
+the normals there, both weighted by a third of the triangles around the vertex,
 
     Chamfer distance   (mean of d from A to B + mean of d from B to A) / 2                        [mm]
-    angle of normals   the same of theta                                                          [degrees]
+    angle of normals   the same of theta
+    [degrees]
 
-(Cignoni, Rocchini and Scopigno 1998). They are blind to cloth that slides along itself. What moves on another
-mesh than the scene's has these numbers and its penetration alone.
+(Cignoni, Rocchini and Scopigno 1998). They are blind to cloth that slides along itself. What moves on
+another mesh than the scene's has these numbers and its penetration alone.
 """
 
 from __future__ import annotations
@@ -62,7 +63,9 @@ def _one_way(x: Vertices, faces: Faces, y: Vertices, others: Faces) -> tuple[flo
     shares = _barycentric(points, y[corners])
     of_nearest = np.einsum("vk,vki->vi", shares, vertex_normals(np.ascontiguousarray(y), others)[corners])
     here = vertex_normals(np.ascontiguousarray(x), faces)
-    angles = np.arctan2(np.linalg.norm(np.cross(here, of_nearest), axis=1), (here * of_nearest).sum(axis=1))
+    angles = np.arctan2(
+        np.linalg.norm(np.cross(here, of_nearest), axis=1), (here * of_nearest).sum(axis=1)
+    )
     weights = np.bincount(faces.ravel(), np.repeat(triangle_areas(x, faces), 3), len(x))
     means = np.average(np.stack([np.sqrt(squared), angles]), axis=1, weights=weights)
     return float(means[0]), float(means[1])

@@ -1,7 +1,7 @@
 """Microbenchmarks: a solver step, a search of contact, a training step, a frame of a network.
 
-Each class is one of asv: `setup` makes what its function `time_...` then does again and again. Times belong
-to the machine that they were taken on: compare ratios.
+Each class is one of asv: `setup` makes what its function `time_...` then does again and again. Times
+belong to the machine that they were taken on: compare ratios.
 """
 
 from __future__ import annotations
@@ -93,7 +93,9 @@ class TrainingStep:
     def setup(self, network: str, vertices: int) -> None:
         """Do what a training does before its first step."""
         training, dressed, motions = TRAININGS[network], dressed_body(vertices), embedded_motions(MOTIONS)
-        targets = {motion.name: dressed.skinned(motion) for motion in motions} if training.simulated else None
+        targets = (
+            {motion.name: dressed.skinned(motion) for motion in motions} if training.simulated else None
+        )
         self.trainer = Trainer(
             training.kind, dressed, motions, steps=10_000, seed=0, recipe=training.recipe,
             trajectories=targets,

@@ -66,7 +66,8 @@ def choose_cells(read: ReadStudy) -> tuple[tuple[Cell, ...], tuple[Case, ...]]:
     order = {name: place for place, name in enumerate((*read.methods, *study.rollouts))}
     cells = _timed_once(
         sorted(
-            (*chosen.values(), *stored), key=lambda c: (places[c.scene.name], order.get(c.method, 0), c.seed)
+            (*chosen.values(), *stored),
+            key=lambda c: (places[c.scene.name], order.get(c.method, 0), c.seed),
         )
     )
     _check_user_scenes([cell.scene for cell in cells], read.motions)
@@ -104,11 +105,13 @@ def scenes_of_parts(read: ReadStudy) -> dict[str, list[str]]:
     """Return part -> names of its scenes.
 
     A scene that field `scenes` names and no part lists is met in the first part with a scene of its kind:
-    called by its whole name (without such a part in the first), or in a motion of the split by a pattern that
-    no listed scene has, as 'trousers/*'.
+    called by its whole name (without such a part in the first), or in a motion of the split by a pattern
+    that no listed scene has, as 'trousers/*'.
     """
     declared, wanted, parts = read.scenes, read.study.scenes, read.study.parts
-    usual = {name: matching(declared, expanded(part.scenes, read.motions)) for name, part in parts.items()}
+    usual = {
+        name: matching(declared, expanded(part.scenes, read.motions)) for name, part in parts.items()
+    }
     if not wanted:
         return usual
     further = {n: matching(declared, expanded(p.optional_scenes, read.motions)) for n, p in parts.items()}

@@ -7,7 +7,15 @@ from dataclasses import dataclass
 
 from benchmarks.plan.study import Study, StudyError, nearest
 from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, of_garment
-from snug.motion.library import DYNAMIC_TEST, DYNAMIC_VALIDATION, LIBRARY, TEST, TRAIN, VALIDATION, clip_of
+from snug.motion.library import (
+    DYNAMIC_TEST,
+    DYNAMIC_VALIDATION,
+    LIBRARY,
+    TEST,
+    TRAIN,
+    VALIDATION,
+    clip_of,
+)
 
 
 @dataclass(frozen=True)
@@ -15,7 +23,8 @@ class Motions:
     """Names of the motions of a run by their roles; garments that swing have others of the library.
 
     files: those that came from a user's files. worn: the garments of the run; the first is that of a run
-    where none is named. split: the role whose motions stand in the suites' scenes, "test" or "validation".
+    where none is named. split: the role whose motions stand in the suites' scenes, "test" or
+    "validation".
     few: so many of them, the first, stand there; None: all.
     """
 
@@ -66,12 +75,13 @@ class Motions:
 def split_motions(study: Study, files: Collection[str] = ()) -> Motions:
     """Return which motions train, validate and test; `files` are those of a user's files.
 
-    Where the study names none, those of the library test and validate, and of files alone the first in the
-    order of names tests. The library takes part where it is named among the motions, or where no file is.
+    Where the study names none, those of the library test and validate, and of files alone the first in
+    the order of names tests. The library takes part where it is named among the motions, or where no file
+    is.
 
-    Validation and test motions of the library never train, and its test motions never validate: where a part
-    of a recorded clip is measured, no other part of that clip trains. Where nothing is left to train on, the
-    library trains.
+    Validation and test motions of the library never train, and its test motions never validate: where a
+    part of a recorded clip is measured, no other part of that clip trains. Where nothing is left to train
+    on, the library trains.
 
     Raises:
         StudyError: a name that no motion has, or a split without motions.

@@ -44,7 +44,11 @@ OF_SCENES = tuple(SHORT)[:4]
 SINGLE = ("body", "garment", "trained")  # given once
 BEHIND_A_PATH = "units up fps other-mesh motion-up motion-fps garment-units garment-up"
 REPLACED = {  # former option, which people have in scripts -> what to say in its place
-    **{f"--{f.name.replace('_', '-')}": f"--set {f.name}=..." for f in fields(Study) if f.name not in SHORT},
+    **{
+        f"--{f.name.replace('_', '-')}": f"--set {f.name}=..."
+        for f in fields(Study)
+        if f.name not in SHORT
+    },
     **{f"--{name}": "say it behind the path: FILE,units=cm" for name in BEHIND_A_PATH.split()},
     "--preset": "name a study (smoke, paper), or --set sizes=NAME",
     "--suite": "name parts of a study: python -m benchmarks.run full:NAME",
@@ -140,8 +144,8 @@ def split(values: Sequence[str]) -> tuple[str, ...]:
 def list_names(study: Study) -> str:
     """Return studies, scenes, methods, motions, sizes and known answers, one line each.
 
-    Every scene and method can be named in every study. Those that take part without being named are those of
-    the given study.
+    Every scene and method can be named in every study. Those that take part without being named are those
+    of the given study.
     """
     read = read_files(study)
     motions, parts = read.motions, study.parts

@@ -67,11 +67,11 @@ class Network:
 class Plan:
     """Everything to be done.
 
-    metrics: modules of metrics that are not the project's, see benchmarks.plan.user_files. inputs: the user's
-    files, as read. retry: whether tasks that have failed are done again; fresh: all that the folder holds is
-    forgotten first. workers: processes side by side where nothing is timed. scheduler: address of a cluster
-    that does what is not timed; empty: this machine does. Raises StudyError where two cells have the files of
-    one: slashes of names become hyphens there.
+    metrics: modules of metrics that are not the project's, see benchmarks.plan.user_files. inputs: the
+    user's files, as read. retry: whether tasks that have failed are done again; fresh: all that the
+    folder holds is forgotten first. workers: processes side by side where nothing is timed. scheduler:
+    address of a cluster that does what is not timed; empty: this machine does. Raises StudyError where
+    two cells have the files of one: slashes of names become hyphens there.
     """
 
     study: Study
@@ -148,14 +148,16 @@ def network_of(cell: Cell) -> Network | None:
 def protocol_of(cell: Cell, plan: Plan) -> str:
     """Return the protocol of a cell's rows: its number, or OWN where scene or settings are a user's.
 
-    Settings are the preset, the body, the garment with its material, the motion, the reference, and what the
-    project's own networks train on.
+    Settings are the preset, the body, the garment with its material, the motion, the reference, and what
+    the project's own networks train on.
     """
     scene, inputs, sizes = cell.scene, plan.inputs, plan.study.sizes
     given = scene.dressed and (inputs.body or scene.motion in inputs.motions)
     if given or sizes != find_preset(sizes.name) or not _is_declared(scene, sizes.name):
         return OWN
-    if any(c.entry.role == "reference" and c.entry.module == STORED for c in plan.cells if c.scene == scene):
+    if any(
+        c.entry.role == "reference" and c.entry.module == STORED for c in plan.cells if c.scene == scene
+    ):
         return OWN
     network = network_of(cell)
     if network is None or network.users_training:
@@ -177,10 +179,14 @@ def _is_declared(scene: Scene, preset: str) -> bool:
     """Return whether the project declares the scene so; a run may leave out what is measured in it."""
     motions = (scene.motion,) * bool(scene.motion)
     declared = _declared_with(motions, motions).get(scene.name)
-    return declared is not None and replace(declared.at(find_preset(preset)), metrics=scene.metrics) == scene
+    return (
+        declared is not None and replace(declared.at(find_preset(preset)), metrics=scene.metrics) == scene
+    )
 
 
-WORKERS = 2  # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
+WORKERS = (
+    2  # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
+)
 
 
 def make_plan(
@@ -194,12 +200,12 @@ def make_plan(
 ) -> Plan:
     """Return the plan of a study: cells, cases, motions and a user's inputs as read.
 
-    All else is as of a Plan; without a folder it is a new one, without workers as many as usual. `scenes` are
-    further ones that no file declares.
+    All else is as of a Plan; without a folder it is a new one, without workers as many as usual. `scenes`
+    are further ones that no file declares.
 
     Raises:
-        ValueError: one line for the first thing that cannot be met, with what there is instead. Nothing has
-            been created then.
+        ValueError: one line for the first thing that cannot be met, with what there is instead. Nothing
+            has been created then.
 
     >>> from benchmarks.plan.study import option, read_study
     >>> study = read_study("default", [option("scenes", "flag"), option("methods", "simulation")])
@@ -236,7 +242,9 @@ def read_files(study: Study, scenes: Sequence[Scene] = ()) -> ReadStudy:
     study, user_scenes, user_methods, user_cases = user_files.declarations_of(study)
     garment, self_contact = study.garment, study.self_contact
     if garment and garment.name in {name.split("/")[0] for name in all_scenes("-", "-")}:
-        raise StudyError(f"{garment.path}: the project has scenes of that name: give the file another name")
+        raise StudyError(
+            f"{garment.path}: the project has scenes of that name: give the file another name"
+        )
     if self_contact and not installed("ipctk"):
         raise StudyError("self_contact: needs the package ipctk: pip install ipctk")
     inputs = read_inputs(study.body, garment, study.motions, study.motion_files)
@@ -278,7 +286,9 @@ def check_machines(study: Study, folder: Path, scheduler: str) -> None:
     trained = study.trained
     if trained and not trained.is_dir():
         raise StudyError(f"trained: {trained}: no such folder; without DIR the package's are taken")
-    if trained and trained.resolve() == folder.resolve():  # where networks of another training are removed
+    if (
+        trained and trained.resolve() == folder.resolve()
+    ):  # where networks of another training are removed
         raise StudyError(f"trained: {trained}: the folder of this run itself: give another by --out")
     for name, given in (("rollouts", study.rollouts), ("trained", trained), ("device", study.device)):
         if scheduler and given and given != "cpu":

@@ -31,17 +31,17 @@ class StudyError(ValueError):
 class Part:
     """Scenes that meet methods, and known answers; its name is the column `suite` of its rows.
 
-    A pattern has `*`, `?` or `[..]`; one that begins with `!` takes names out. In scenes, {garment} stands
-    for the first garment, {motion} for each measured motion of a scene's garment, {motion 1} for the first
-    of them, {swinging 1} for the first of a garment that swings.
+    A pattern has `*`, `?` or `[..]`; one that begins with `!` takes names out. In scenes, {garment}
+    stands for the first garment, {motion} for each measured motion of a scene's garment, {motion 1} for
+    the first of them, {swinging 1} for the first of a garment that swings.
 
     Attributes:
         question: what it answers, one line.
         scenes: names, patterns and files of scenes.
         optional_scenes: those that take part only where field `scenes` of the study names them.
         methods: names, patterns and files of methods.
-        cases: names, patterns and files of known answers; {smoke} for those marked so, {short} for all but
-            long.
+        cases: names, patterns and files of known answers; {smoke} for those marked so, {short} for all
+            but long.
     """
 
     question: str = ""
@@ -94,8 +94,8 @@ class Study:
         self_contact: whether the cloth of simulations is kept from crossing itself (needs ipctk).
         trained: networks of the package (true), or of the run in a folder, in place of training; methods
             whose network is not there are skipped, those of your own files trained.
-        rollouts: name -> file of another program's roll-out, as a method; or a table: path, units, up, fps,
-            other_mesh, ms. The path may have {scene}, the scene's name with hyphens for slashes.
+        rollouts: name -> file of another program's roll-out, as a method; or a table: path, units, up,
+            fps, other_mesh, ms. The path may have {scene}, the scene's name with hyphens for slashes.
         device: where networks train, cpu or cuda.
         show: pictures and films that the documents show; a study that has it is published.
     """
@@ -143,8 +143,15 @@ def nearest(word: str, names: Sequence[str], otherwise: str = "see --list") -> s
 FILE = "study.toml"  # of a study that is a folder
 PACKAGED = Path(__file__).parents[1] / "studies"
 FOLDERS = (Path("studies"), Path(__file__).parents[2] / "studies")  # of studies that bring code
-HIDDEN = {Study: ("written",), Preset: ("name", "description"), RollOutOption: ("role",)}  # no file has them
-WORDS_FOR_TABLES = {"garment": "path", "sizes": "base"}  # table -> the field that a word in its place means
+HIDDEN = {
+    Study: ("written",),
+    Preset: ("name", "description"),
+    RollOutOption: ("role",),
+}  # no file has them
+WORDS_FOR_TABLES = {
+    "garment": "path",
+    "sizes": "base",
+}  # table -> the field that a word in its place means
 PATHS = ("body", "trained", "motions", "path", "material")  # fields that hold paths
 KINDS = {str: "text", int: "a whole number", float: "a number", bool: "true or false"}
 Table = Mapping[str, Any]
@@ -155,8 +162,8 @@ def read_study(word: str = "default", options: Sequence[Table] = ()) -> Study:
     """Return the study of that name or path, with fields from options in place of its own.
 
     Args:
-        word: name of a study of the package, or path of a file or folder; behind a colon the names of parts,
-            as in full:garments,speed, for these alone.
+        word: name of a study of the package, or path of a file or folder; behind a colon the names of
+            parts, as in full:garments,speed, for these alone.
         options: see `option`; later ones hold before earlier ones.
 
     Raises:
@@ -235,7 +242,9 @@ def _line_of(path: Path, field: str) -> str:
 
 def study_names() -> list[str]:
     """Return the names of the package's studies, and of those with code that lie beside it."""
-    with_code = {path.parent.name: None for folder in FOLDERS for path in sorted(folder.glob(f"*/{FILE}"))}
+    with_code = {
+        path.parent.name: None for folder in FOLDERS for path in sorted(folder.glob(f"*/{FILE}"))
+    }
     return [*(path.stem for path in sorted(PACKAGED.glob("*.toml"))), *with_code]
 
 
@@ -305,7 +314,9 @@ def _beside(folder: Path, name: str, value: Any) -> Any:
 
 def _with_tables(table: Table) -> dict[str, Any]:
     """Return the fields with a table for each word that may stand in place of one."""
-    meant = {name: WORDS_FOR_TABLES[name] for name in WORDS_FOR_TABLES if isinstance(table.get(name), str)}
+    meant = {
+        name: WORDS_FOR_TABLES[name] for name in WORDS_FOR_TABLES if isinstance(table.get(name), str)
+    }
     table = {**table, **{name: {field: table[name]} for name, field in meant.items()}}
     if isinstance(files := table.get("rollouts"), Mapping):
         table["rollouts"] = {n: {"path": v} if isinstance(v, str) else v for n, v in files.items()}

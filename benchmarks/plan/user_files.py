@@ -1,7 +1,7 @@
 """Methods, scenes, metrics and known answers that a user's file declares.
 
-A file is named by its path, which means all that it declares. Entries carry the file that they come from, so
-that every process can load it.
+A file is named by its path, which means all that it declares. Entries carry the file that they come from,
+so that every process can load it.
 """
 
 from __future__ import annotations
@@ -58,7 +58,8 @@ def declarations_of(study: Study) -> tuple[Study, list[Scene], list[MethodEntry]
     """Read the files that a study names; a known answer belongs to the part that names its file.
 
     Returns:
-        The study with names in place of files, and the scenes, methods and known answers that they declare.
+        The study with names in place of files, and the scenes, methods and known answers that they
+        declare.
 
     Raises:
         DeclarationError: a file that cannot be read, or declares none.
@@ -113,7 +114,9 @@ def entries_of(kind: Kind, home: str) -> list[Any]:
     else:
         entries = [_placed(kind, entry, home) for entry in declared]
     needs_function = home in {getattr(entry, "module", home) for entry in entries}
-    _demand(not needs_function or hasattr(module, kind.function), f"{home}: has no function {kind.function}")
+    _demand(
+        not needs_function or hasattr(module, kind.function), f"{home}: has no function {kind.function}"
+    )
     return entries
 
 

@@ -1,7 +1,7 @@
 """Protocol: its number and digests, the ensemble of the reference, and the rules of verdicts of reports.
 
-The number stands for all that a result depends on and that no method brings itself. Two numbers of the same
-protocol can stand in one table.
+The number stands for all that a result depends on and that no method brings itself. Two numbers of the
+same protocol can stand in one table.
 """
 
 from __future__ import annotations
@@ -13,7 +13,8 @@ from benchmarks.provenance import digest
 from benchmarks.results.row import ResultsError
 
 NUMBER = "1.0"
-# Part of the protocol -> digest of its definitions. tests/benchmarks/test_protocol.py holds the code to them.
+# Part of the protocol -> digest of its definitions. tests/benchmarks/test_protocol.py holds the code to
+# them.
 DIGESTS = {
     "scenes": "88c6128b67b3dd78",
     "materials": "37f8eb4aecad748b",
@@ -53,8 +54,9 @@ def one_protocol(protocols: Iterable[str], where: object) -> str:
     return numbers[0] if numbers else ""
 
 
-# Family and level of each member: a start perturbed by 1e-4 m, contact planes searched twice in each step, a
-# tolerance a hundred times tighter. A simulation with another time step is none: it solves another problem.
+# Family and level of each member: a start perturbed by 1e-4 m, contact planes searched twice in each
+# step, a tolerance a hundred times tighter. A simulation with another time step is none: it solves
+# another problem.
 MEMBERS = {
     "simulation-perturbed-1e-4": ("simulation-perturbed", 1e-4),
     "simulation-refrozen": ("simulation-refrozen", None),
@@ -75,8 +77,8 @@ def is_member(family: str, level: float | None) -> bool:
 def spread(changes: Iterable[float]) -> float | None:
     """Return the standard deviation (n - 1) of a number over the reference and the members of its ensemble.
 
-    changes: by how much each member changes the number when it takes the reference's place. None for fewer
-    than LEAST_MEMBERS.
+    changes: by how much each member changes the number when it takes the reference's place. None for
+    fewer than LEAST_MEMBERS.
 
     >>> spread([0.1, -0.1]), spread([0.1])
     (0.1, None)

@@ -50,18 +50,20 @@ class Row:
     Attributes:
         suite, scene, method, seed, metric: the key of the row.
         unit, value: the number; None (an empty cell) where there is none.
-        status, reason: `ok`, `diverged`, `stalled`, `timeout`, `out-of-memory`, `failed` or `skipped`, and
-            why. A skipped row has a reason and no value.
+        status, reason: `ok`, `diverged`, `stalled`, `timeout`, `out-of-memory`, `failed` or `skipped`,
+            and why. A skipped row has a reason and no value.
         expected, tolerance: of a validation case.
-        uncertainty: standard deviation of the value over the reference ensemble, or its standard error as a
-            sample of frames, in the unit of the value.
-        moved: change of the value by each member of the reference ensemble in the reference's place, as JSON.
+        uncertainty: standard deviation of the value over the reference ensemble, or its standard error as
+            a sample of frames, in the unit of the value.
+        moved: change of the value by each member of the reference ensemble in the reference's place, as
+            JSON.
         preset, commit, hardware, dtype, threads: origin.
         protocol: number of the protocol; `own` where scene, metric or settings are a user's.
         terms: energies of the scene, joined by `+`.
         garment, motion, part: of the scene; the part is `whole`, `clip`, `loop` or `start`.
         family, level: name shared by methods that differ by one number, and that number.
-        role: place of the method in tables and plots, such as `reference`, `solver`, `network` or `baseline`.
+        role: place of the method in tables and plots, such as `reference`, `solver`, `network` or
+            `baseline`.
         base: method that this one varies or starts from.
         seeded: whether another seed gives another value.
         pairing_group: name shared by variants of one method, which are compared seed by seed.

@@ -138,10 +138,10 @@ ENERGY = "energy/"
 def write_frame_energies(folder: RunFolder, rows: Iterable[Row]) -> None:
     """Write frame_energies.csv, whole or not at all: the energy of each evaluated frame by term.
 
-    A line is a frame: scene, method, seed, seconds of the motion, then joules of each term and of their sum.
-    A term that a scene does not have is left empty. It holds what the paper draws over time, whole motions in
-    garments by reference, baselines and networks; without any there is no file. Curves of all else lie beside
-    their trajectories: they are too large to be published.
+    A line is a frame: scene, method, seed, seconds of the motion, then joules of each term and of their
+    sum. A term that a scene does not have is left empty. It holds what the paper draws over time, whole
+    motions in garments by reference, baselines and networks; without any there is no file. Curves of all
+    else lie beside their trajectories: they are too large to be published.
     """
     import pandas as pd
 
@@ -152,7 +152,9 @@ def write_frame_energies(folder: RunFolder, rows: Iterable[Row]) -> None:
         if row.metric == "energy/total" and row.value is not None
     )
     curves = {cell: made for cell in cells if SECONDS in (made := _curves(folder.curves_path(*cell)))}
-    terms = list(dict.fromkeys(name for energies in curves.values() for name in energies if name != SECONDS))
+    terms = list(
+        dict.fromkeys(name for energies in curves.values() for name in energies if name != SECONDS)
+    )
     if not terms:
         folder.frame_energies_path.unlink(missing_ok=True)
         return
@@ -193,4 +195,6 @@ def read_frame_energies(path: Path) -> pd.DataFrame:
         numbers = {name: [float(cell or "nan") for cell in table[name]] for name in columns[3:]}
         return table.assign(seed=list(map(int, table["seed"])), **numbers)
     except (OSError, ValueError) as error:
-        raise ResultsError(f"{path}: not readable as CSV in UTF-8 ({' '.join(str(error).split())})") from None
+        raise ResultsError(
+            f"{path}: not readable as CSV in UTF-8 ({' '.join(str(error).split())})"
+        ) from None

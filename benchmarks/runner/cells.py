@@ -67,7 +67,9 @@ def run_cell(cell: Cell, least: float, context: Context, needed: Needed) -> Outc
     try:
         return compute_cell(cell, least, context)
     except Exception as error:
-        for name in files_of(cell, context.folder):  # nobody is to look at the frames of a cell that failed
+        for name in files_of(
+            cell, context.folder
+        ):  # nobody is to look at the frames of a cell that failed
             (context.folder.path / name).unlink(missing_ok=True)
         return replace(failure(error), result={"peak": peak_memory()})
 
@@ -103,7 +105,9 @@ def compute_cell(cell: Cell, least: float, context: Context) -> Outcome:
         result |= times(cell, reading, frames) | {"inputs": inputs.seconds}
         reading = replace(reading, complaint=reading.complaint or inputs.complaint)
     entry = cell.entry
-    status, reason = judge(trajectory, reading, scene, truncated=entry.truncated, other_mesh=entry.other_mesh)
+    status, reason = judge(
+        trajectory, reading, scene, truncated=entry.truncated, other_mesh=entry.other_mesh
+    )
     if status == "failed":
         return Outcome(status, reason, failed=True, result={"peak": peak})
     paths = [folder.trajectory_path(*cell.key)]
@@ -178,7 +182,12 @@ def clocked_inputs(method: Method, scene: BuiltScene, *, least: float) -> Readin
 
 
 def judge(
-    trajectory: Trajectory, reading: Reading, scene: BuiltScene, *, truncated: bool, other_mesh: bool = False
+    trajectory: Trajectory,
+    reading: Reading,
+    scene: BuiltScene,
+    *,
+    truncated: bool,
+    other_mesh: bool = False,
 ) -> tuple[str, str]:
     """Status and reason of a row, from what the trajectory says of itself, what is in it, and the clock."""
     import numpy as np
@@ -196,7 +205,10 @@ def judge(
     if trajectory.status == "max_iterations":
         return ("ok", "") if truncated else ("stalled", reason)
     if trajectory.status not in STATUSES:
-        return "failed", f"unknown status '{trajectory.status}', use one of {', '.join(STATUSES)}; {reason}"
+        return (
+            "failed",
+            f"unknown status '{trajectory.status}', use one of {', '.join(STATUSES)}; {reason}",
+        )
     status = "ok" if trajectory.status == "converged" else trajectory.status
     if status != "ok" and not truncated and "converged" in trajectory.frame_fields:
         bad = int((trajectory.frame_fields["converged"] < 0.5).sum())

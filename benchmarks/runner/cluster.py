@@ -1,7 +1,7 @@
 """Untimed tasks on a cluster of dask.distributed that the user has started.
 
-dask hands tasks to workers, does them again where a worker died, and ships their outcomes. Files lie in the
-run's folder, which all machines have to see under one path.
+dask hands tasks to workers, does them again where a worker died, and ships their outcomes. Files lie in
+the run's folder, which all machines have to see under one path.
 """
 
 from __future__ import annotations
@@ -144,7 +144,11 @@ def software_of(task: Task) -> dict[str, str]:
     method = task.inputs.get("method")
     files = method["files"] if isinstance(method, dict) else ()
     digests = {name: digest_of_file(Path(name)) for name in files if Path(name).is_file()}
-    return software("benchmarks/runner", *task.code) | digests | {"package Python": platform.python_version()}
+    return (
+        software("benchmarks/runner", *task.code)
+        | digests
+        | {"package Python": platform.python_version()}
+    )
 
 
 # --- in a worker ---
@@ -164,7 +168,9 @@ def do_task(assets: Path, work: bytes) -> tuple[Outcome, str]:
     worker = get_worker()
     key = worker.get_current_task()
     if not assets.is_file():
-        unseen = f"it does not see the run's folder {assets.parent}: by --out give one that all machines see"
+        unseen = (
+            f"it does not see the run's folder {assets.parent}: by --out give one that all machines see"
+        )
         raise RunStopped(f"worker {worker.address}: {unseen}")
     task, needed, software = pickle.loads(work)
     if changed := sorted(name for name, _ in software.items() ^ software_of(task).items()):

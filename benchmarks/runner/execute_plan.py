@@ -42,8 +42,8 @@ def summary(rows: Sequence[Row]) -> str:
 def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) -> int:
     """Run the plan, with its assets where they have been made; then make its report unless that is unwanted.
 
-    Returns 0 when all ended well, 1 when something failed or there is no report. Raises RunRefused where the
-    plan's cluster is gone.
+    Returns 0 when all ended well, 1 when something failed or there is no report. Raises RunRefused where
+    the plan's cluster is gone.
     """
     tasks = tasks_of(plan)
     log = RunLog(plan)
@@ -125,13 +125,16 @@ def make_report(log: RunLog) -> str | None:
 def held(folder: Path) -> Iterator[None]:
     """Hold a folder, made where it is not there. Raises RunRefused where another run, or a file, has it.
 
-    The lock lies on the folder itself and leaves no file. The system releases it with the process, however
-    that ended. Where the system or its file system has no such locks nothing is held, and that is said.
+    The lock lies on the folder itself and leaves no file. The system releases it with the process,
+    however that ended. Where the system or its file system has no such locks nothing is held, and that is
+    said.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:  # as where a file is in the way
-        raise RunRefused(f"--out {folder}: cannot be made ({error.strerror}); name another folder") from None
+        raise RunRefused(
+            f"--out {folder}: cannot be made ({error.strerror}); name another folder"
+        ) from None
     with ExitStack() as closing:
         try:
             hold = os.open(folder, os.O_RDONLY)

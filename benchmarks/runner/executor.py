@@ -26,7 +26,8 @@ Done = tuple[Task, Outcome]
 class LocalProcesses:
     """Single-threaded processes of this machine, of which `slots` are at work side by side.
 
-    They stay for the next batch, which then loads and compiles nothing again. A cluster has the same methods.
+    They stay for the next batch, which then loads and compiles nothing again. A cluster has the same
+    methods.
     """
 
     def __init__(self, folder: RunFolder, assets: Assets | None, slots: int) -> None:

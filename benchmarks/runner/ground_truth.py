@@ -70,12 +70,17 @@ def simulate_motion(scene: Scene, entry: MethodEntry, context: Context, needed: 
 
 
 def simulate_clips(
-    scene: Scene, entry: MethodEntry, motions: tuple[str, ...], part: int, context: Context, needed: Needed
+    scene: Scene,
+    entry: MethodEntry,
+    motions: tuple[str, ...],
+    part: int,
+    context: Context,
+    needed: Needed,
 ) -> Outcome:
     """Write the vertices of those clips whose simulation, settled like a motion's, is whole and converged.
 
-    The clips are mixed from `motions`: those that `part` + 1 augmented frames for each original one have, and
-    `part` have not. The scene is that of any motion in the garment.
+    The clips are mixed from `motions`: those that `part` + 1 augmented frames for each original one have,
+    and `part` have not. The scene is that of any motion in the garment.
     """
     import numpy as np
 

@@ -1,8 +1,8 @@
 """Work that may hang or crash: done in a process of its own, which is ended at a deadline.
 
 A solver's own timeout is looked at between its iterations; a loop that never ends, or compiled code that
-takes the interpreter down with it, has to be stopped from outside. The process leads a group of its own, so
-that what it has started ends with it; and it ends by itself when the parent does, however that went.
+takes the interpreter down with it, has to be stopped from outside. The process leads a group of its own,
+so that what it has started ends with it; and it ends by itself when the parent does, however that went.
 """
 
 from __future__ import annotations
@@ -32,7 +32,9 @@ if TYPE_CHECKING:
     from benchmarks.assets import Assets
 
 PATIENCE = 2.0  # [s] for an idle process to clean up behind itself: semaphores, as of progress bars
-COMPILING = 900.0  # [s] for what a process does before its first task: it may have to compile every kernel
+COMPILING = (
+    900.0  # [s] for what a process does before its first task: it may have to compile every kernel
+)
 # What every process loads. Nothing that a scene may do without: not torch, not what a body is asked with.
 LOADED_BY_ALL = ("h5py", "numba", "scipy.sparse.linalg", "reference_sim", "benchmarks.runner.cells")
 # What every task of a scene with a body loads: torch skins the garment.
@@ -76,7 +78,9 @@ class TaskProcess:
                 outcome = self._call(perform, task.batch_id, task.run, needed, seconds=task.deadline)
         except Exception as error:
             outcome = failure(error)
-        if outcome.status == "timeout":  # of a program, ended by its method: what it has started may run on
+        if (
+            outcome.status == "timeout"
+        ):  # of a program, ended by its method: what it has started may run on
             self.close()
         return outcome if outcome.seconds else replace(outcome, seconds=time.perf_counter() - clock)
 
@@ -139,7 +143,10 @@ def how_it_ended(code: int) -> tuple[str, str]:
     """
     if code == -signal.SIGKILL:
         return "the process was killed by SIGKILL: the system was out of memory", "out-of-memory"
-    return f"the process ended with {f'status {code}' if code >= 0 else signal.Signals(-code).name}", "failed"
+    return (
+        f"the process ended with {f'status {code}' if code >= 0 else signal.Signals(-code).name}",
+        "failed",
+    )
 
 
 def end_group(pid: int) -> None:

@@ -1,6 +1,7 @@
 """The loop over tasks: reuse a cached outcome, or run the task in its process and keep its outcome.
 
-Dry run, resume, failures, what an interrupt leaves and exclusive timing are decided here and nowhere else.
+Dry run, resume, failures, what an interrupt leaves and exclusive timing are decided here and nowhere
+else.
 """
 
 from __future__ import annotations
@@ -132,7 +133,11 @@ class Runner:
         """Write the outcome into the cache; one that cannot be written is a failure."""
         try:
             kept = self.cache.keep(task, outcome, self.outcomes)
-        except (TypeError, ValueError, OSError) as error:  # a result that is no plain value, a file not there
+        except (
+            TypeError,
+            ValueError,
+            OSError,
+        ) as error:  # a result that is no plain value, a file not there
             kept = self.cache.keep(task, failure(error), self.outcomes)
         self.outcomes[task.id] = kept
 

@@ -49,7 +49,9 @@ def measure_cell(
         curves[SECONDS][: roll_out.scene.warm_up] = np.nan
     frames = roll_out.trajectory.frames
     padded: dict[str, Any] = {  # nan after the last frame that was measured
-        name: np.pad(curve, [(0, frames - len(curve))] + [(0, 0)] * (curve.ndim - 1), constant_values=np.nan)
+        name: np.pad(
+            curve, [(0, frames - len(curve))] + [(0, 0)] * (curve.ndim - 1), constant_values=np.nan
+        )
         for name, curve in curves.items()
     }
     with replacing(path) as temporary:
@@ -87,8 +89,8 @@ def measured(
 ) -> tuple[dict[str, float | Estimate], dict[str, np.ndarray], tuple[str, str]]:
     """Return metrics and curves of a roll-out, and status and reason where a metric says that it has failed.
 
-    All are empty where no frame is left after the warm-up. chosen: names of measurements, None for all that
-    apply; outside: files of users.
+    All are empty where no frame is left after the warm-up. chosen: names of measurements, None for all
+    that apply; outside: files of users.
     """
     metrics: dict[str, float | Estimate] = {}
     curves: dict[str, np.ndarray] = {}

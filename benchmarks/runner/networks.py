@@ -47,8 +47,8 @@ class NetworkTraining:
         reads: tasks that simulate motions and mixed clips, where it learns from simulations.
         device: cpu or cuda, for every part of a step.
         inputs: name -> digest of each input.
-        key: digest of inputs, code and packages. With equal simulations, a training of the same key that was
-            killed goes on from its last checkpoint, and ends as it would have.
+        key: digest of inputs, code and packages. With equal simulations, a training of the same key that
+            was killed goes on from its last checkpoint, and ends as it would have.
     """
 
     network: Network

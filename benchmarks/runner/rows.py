@@ -34,7 +34,9 @@ def rows_of(plan: Plan, tasks: Sequence[Task], outcomes: Outcomes) -> list[Row]:
     return [*with_uncertainty(cells, plan.metrics), *others]
 
 
-def rows_of_cell(cell: Cell, plan: Plan, tasks: Mapping[TaskId, Task], outcomes: Outcomes) -> Iterator[Row]:
+def rows_of_cell(
+    cell: Cell, plan: Plan, tasks: Mapping[TaskId, Task], outcomes: Outcomes
+) -> Iterator[Row]:
     """Yield the rows of a cell in each of its suites; a cell without metrics is one row with its reason."""
     outcome = outcomes.get(cell.id())
     if outcome is None:
@@ -205,7 +207,8 @@ def _origin(outcome: Outcome, protocol: str) -> dict[str, Any]:
 def with_uncertainty(rows: Sequence[Row], outside: tuple[str, ...] = ()) -> list[Row]:
     """Return the rows, those of the reference with their spread over its ensemble.
 
-    Of answers, and not of what has an uncertainty of its own. outside: where further metrics are declared.
+    Of answers, and not of what has an uncertainty of its own. outside: where further metrics are
+    declared.
     """
     others: dict[tuple[str, str], dict[str, float]] = {}
     for row in rows:

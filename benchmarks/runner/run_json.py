@@ -96,7 +96,9 @@ class RunLog:
             name: {"vertices": len(g.rest_positions), "material": dataclasses.asdict(g.material)}
             for name, g in assets.garments.items()
         }
-        self.config["motions"]["frames"] = {name: motion.frames for name, motion in assets.motions.items()}
+        self.config["motions"]["frames"] = {
+            name: motion.frames for name, motion in assets.motions.items()
+        }
         self.config["motion_sources"] = {name: motion.source for name, motion in assets.motions.items()}
         self.folder.write_config(self.config)
         return assets
@@ -151,7 +153,9 @@ def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
     for name in sorted(names, key=lambda name: order.get(name, len(order))):
         with suppress(KeyError):  # of a case, which describes its rows itself
             fields = vars(find_metric(name, plan.metrics))
-            metrics[name] = {field: fields[field] for field in fields if field not in ("name", "declared_in")}
+            metrics[name] = {
+                field: fields[field] for field in fields if field not in ("name", "declared_in")
+            }
     scenes = {
         scene.name: {"description": scene.description, "role": plan.motions.role_of(scene.motion)}
         for scene in plan.scenes

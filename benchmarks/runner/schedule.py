@@ -37,8 +37,8 @@ from benchmarks.scenes import find_scene, of_garment
 if TYPE_CHECKING:
     from benchmarks.validation.case import Case
 
-# Code that an outcome depends on: whatever of it changes makes the outcome stale. A run also depends on the
-# modules of its method and its scene, see code_behind.
+# Code that an outcome depends on: whatever of it changes makes the outcome stale. A run also depends on
+# the modules of its method and its scene, see code_behind.
 RUNNING = (
     "reference_sim", "snug", "benchmarks/assets.py", "benchmarks/scene.py", "benchmarks/scenes",
     "benchmarks/meshes.py", "benchmarks/external", "benchmarks/method.py",
@@ -78,7 +78,9 @@ def users_code(*homes: str) -> tuple[str, ...]:
 
 
 TRAINED = "training"  # the stage of networks that no file has
-AT_ONCE = 8  # cells of one scene whose processes wait for their repeats: each holds some hundred megabytes
+AT_ONCE = (
+    8  # cells of one scene whose processes wait for their repeats: each holds some hundred megabytes
+)
 
 
 def tasks_of(plan: Plan) -> list[Task]:

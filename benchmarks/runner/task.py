@@ -80,7 +80,8 @@ class Task:
         name: unique among the tasks of its kind; part of file names.
         label: for messages.
         stage: title of the stage of a run that it belongs to.
-        run: does it, in a process: a function of a module, or a partial of one. An exception is a failure.
+        run: does it, in a process: a function of a module, or a partial of one. An exception is a
+            failure.
         inputs: plain values that the outcome depends on.
         code: folders and files whose content the outcome depends on, see benchmarks.provenance.
         needs: tasks without whose success it cannot be run; their outcomes count as inputs.
@@ -155,7 +156,8 @@ def one_line(error: BaseException) -> str:
 def failure(error: BaseException) -> Outcome:
     """Return the outcome of a task that raised, or whose process died.
 
-    torch's allocator on a CPU raises a plain RuntimeError. Raises RunStopped for what no task is at fault of.
+    torch's allocator on a CPU raises a plain RuntimeError. Raises RunStopped for what no task is at fault
+    of.
     """
     from reference_sim.files.atomic_files import disk_full
 

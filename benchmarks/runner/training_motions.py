@@ -47,7 +47,8 @@ def write_training_motions(garment: str, plan: Plan, out: Path) -> list[str]:
                 raise StudyError(f"training motion {task.label}: {outcome.status}: {why}")
             files[outcome.result["motion"]] = outcome.files[0]
         simulations = (
-            (assets.motions[name], Trajectory.load(run.path / file).positions) for name, file in files.items()
+            (assets.motions[name], Trajectory.load(run.path / file).positions)
+            for name, file in files.items()
         )
         write_data_set(out, assets.body, assets.garments[garment], simulations)
         shutil.rmtree(run.path)

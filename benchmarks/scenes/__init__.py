@@ -29,7 +29,8 @@ SCENES = (
     _sheet("free_fall", "a thrown sheet with no pins and its weight alone; the exact answer is known"),
 )  # fmt: skip
 
-# Scenes besides the test motions leave costs out, so nothing in them is timed and several run side by side.
+# Scenes besides the test motions leave costs out, so nothing in them is timed and several run side by
+# side.
 WALK = "walk"  # made by code, without a role; walks of recordings train: what breaks here breaks next to them
 ORDINARY = "out_of_distribution/ordinary"
 
@@ -104,7 +105,9 @@ def shapes(motion: str, garment: str = "tshirt") -> list[Scene]:
     The garment's rest state stays that of the mean body, in training, simulation and metrics alike.
     """
     random = Random(SHAPE_SEED)
-    drawn = {str(place): tuple(random.uniform(-3, 3) for _ in range(10)) for place in range(1, SHAPES + 1)}
+    drawn = {
+        str(place): tuple(random.uniform(-3, 3) for _ in range(10)) for place in range(1, SHAPES + 1)
+    }
     return [
         Scene(
             name=f"shapes/{name}",
@@ -193,8 +196,8 @@ def further_scenes(garment: str) -> tuple[Scene, ...]:
 class GarmentScenes:
     """Scenes of a garment of snug.garments: named "<garment>/<motion>" and "<garment>/<motion>@clip".
 
-    dynamic: whether its motions are those that stop within a frame, instead of the run's own. self_contact:
-    whether the cloth of simulations does not cross itself.
+    dynamic: whether its motions are those that stop within a frame, instead of the run's own.
+    self_contact: whether the cloth of simulations does not cross itself.
     """
 
     garment: str
@@ -238,16 +241,21 @@ def of_garment(garment: str, worn: tuple[GarmentScenes, ...] = GARMENT_SCENES) -
 
 
 def all_scenes(
-    motions: Iterable[str], dynamic_motions: Iterable[str], worn: tuple[GarmentScenes, ...] = GARMENT_SCENES
+    motions: Iterable[str],
+    dynamic_motions: Iterable[str],
+    worn: tuple[GarmentScenes, ...] = GARMENT_SCENES,
 ) -> dict[str, Scene]:
     """Return every scene by name: those without a body, then dressed bodies in each motion and in its clip.
 
-    motions: those of the T-shirt, which can do the others too; dynamic_motions: those of garments that swing.
+    motions: those of the T-shirt, which can do the others too; dynamic_motions: those of garments that
+    swing.
     worn: the garments, the first in place of the T-shirt.
     """
     motions, dynamic = list(motions), list(dynamic_motions)
     first = worn[0].garment
-    varied = [s for motion in motions[:1] for s in (there_and_back(motion, first), *shapes(motion, first))]
+    varied = [
+        s for motion in motions[:1] for s in (there_and_back(motion, first), *shapes(motion, first))
+    ]
     every = list(dict.fromkeys((*motions, *dynamic)))
     dressed = [
         scenes.scene(motion, part)

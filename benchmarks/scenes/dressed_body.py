@@ -1,8 +1,8 @@
 """Scene of a body in a garment, doing one motion. The simulator sees the body as a moving mesh.
 
 Before the motion starts the garment settles: the body, already facing and standing as in the first frame,
-moves its limbs from the T-pose into the first pose, then holds still for a while. A part of a motion begins
-with the positions and velocities that a simulation from the motion's own first frame has there.
+moves its limbs from the T-pose into the first pose, then holds still for a while. A part of a motion
+begins with the positions and velocities that a simulation from the motion's own first frame has there.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ def build_dressed_body(
 ) -> BuiltScene:
     """Build the scene of a garment and a motion, or of the clip of it.
 
-    warm_up_frames: at the beginning, not judged; fewer where the motion is short. betas: see shape_of, which
-    says what is raised.
+    warm_up_frames: at the beginning, not judged; fewer where the motion is short. betas: see shape_of,
+    which says what is raised.
     """
     body, garment = assets.body, assets.garments[scene.garment]
     motion = assets.motion(scene.motion, scene.part)
@@ -125,8 +125,8 @@ def with_self_contact(energies: tuple[Energy, ...]) -> tuple[Energy, ...]:
 def settled(cloth: Cloth, energies: tuple[Energy, ...], dressed: Dressed, frames: int) -> np.ndarray:
     """Simulate the cloth to rest on the body in the motion's first pose: positions (V,3) [m].
 
-    Raises RuntimeError when the simulation of the approach did not stay finite, and ValueError for a garment
-    that crosses itself before it where that is not allowed.
+    Raises RuntimeError when the simulation of the approach did not stay finite, and ValueError for a
+    garment that crosses itself before it where that is not allowed.
     """
     body, garment, motion, betas = dressed.body, dressed.garment, dressed.motion, dressed.betas
     first = motion.poses[0]
@@ -160,7 +160,8 @@ def _simulated(
         obstacle=Obstacle(posed, body.faces, rest_positions=body.shaped()),
         pin_positions=handles.__getitem__ if len(garment.pins) else None,
     )  # fmt: skip
-    # A step that diverges ends a simulation: what it leaves is a garment half-way, on a body that moved on.
+    # A step that diverges ends a simulation: what it leaves is a garment half-way, on a body that moved
+    # on.
     if trajectory.frames < motion.frames:
         raise RuntimeError(
             f"the garment did not {aim} of {motion.name}: {trajectory.reason}; the pose may leave it no room"

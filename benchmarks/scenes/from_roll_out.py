@@ -1,6 +1,7 @@
 """Scene that a stored roll-out brings itself: cloth at rest from a mesh, body, and start from the file.
 
-So the pickles of HOOD and ContourCraft are judged, which name neither a motion nor a garment of this project.
+So the pickles of HOOD and ContourCraft are judged, which name neither a motion nor a garment of this
+project.
 """
 
 from __future__ import annotations
@@ -74,7 +75,9 @@ def build(
         _demand_a_size(cloth.rest_positions, rest_mesh, units)
         obstacle = None
         if stored.obstacle is not None and stored.obstacle_faces is not None:  # cloth may touch all of it
-            obstacle = Obstacle(to_metres_y_up(stored.obstacle, units=units, up=up), stored.obstacle_faces)
+            obstacle = Obstacle(
+                to_metres_y_up(stored.obstacle, units=units, up=up), stored.obstacle_faces
+            )
     except MeshError as error:
         raise RollOutFileError(f"{path} with {rest_mesh}: {error}") from None
     contact = () if obstacle is None else (ContactPenalty(cloth),)

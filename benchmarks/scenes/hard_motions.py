@@ -1,10 +1,11 @@
 """Scenes of motions made hard for a network: too fast, too far, an extreme body, very long.
 
-Walks made hard start in the walk's first pose and share its settled shirt; but for the extreme shapes, which
-start in T-pose in the shirt's own rest shape, fitted to that body.
+Walks made hard start in the walk's first pose and share its settled shirt; but for the extreme shapes,
+which start in T-pose in the shirt's own rest shape, fitted to that body.
 
-Nobody simulates a thousand frames and more, so there is no body to collide with. Only some frames are kept:
-those of two stretches that show the same motion, early and late, and of a loop one in fifty besides.
+Nobody simulates a thousand frames and more, so there is no body to collide with. Only some frames are
+kept: those of two stretches that show the same motion, early and late, and of a loop one in fifty
+besides.
 """
 
 from __future__ import annotations
@@ -51,7 +52,9 @@ def build_hard_motion(
     body, garment = assets.body, assets.garments[scene.garment]
     motion = CHANGES[change](make_motion(scene.motion), **options)
     shape = shape_of(body, betas, scene.name)
-    changed = {name: factor * getattr(garment.material, name) for name, factor in (material or {}).items()}
+    changed = {
+        name: factor * getattr(garment.material, name) for name, factor in (material or {}).items()
+    }
     cloth = garment.cloth(replace(garment.material, **changed))
     energies = declared_energies(cloth)
 

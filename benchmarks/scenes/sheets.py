@@ -26,7 +26,11 @@ DT = 1.0 / 30.0  # [s]
 SIZE = 0.4  # [m]
 VELOCITY = np.array([0.7, 2.0, -0.3])  # [m/s] of the fall
 SWING, PERIOD = 0.15, 1.0  # [m] to either side, [s] of the flag's pole
-RADIUS, DRAPED_SIZE, GAP = 0.12, 0.5, 0.02  # [m] of the sphere, of the sheet on it, between both at the start
+RADIUS, DRAPED_SIZE, GAP = (
+    0.12,
+    0.5,
+    0.02,
+)  # [m] of the sphere, of the sheet on it, between both at the start
 
 
 def _built(scene: Scene, cloth: Cloth, frames: int, start: np.ndarray, **further: Any) -> BuiltScene:
@@ -68,7 +72,8 @@ def build_hanging_sheet(
 ) -> BuiltScene:
     """Build the scene of a square sheet pinned at two corners and let go from the horizontal."""
     positions, faces = square_sheet(sheet_cells, SIZE)
-    # Tilted by half a degree: a flat sheet hanging flat is a saddle, from which symmetry alone would choose.
+    # Tilted by half a degree: a flat sheet hanging flat is a saddle, from which symmetry alone would
+    # choose.
     positions[:, 1] += 0.01 * positions[:, 0]
     cloth = Cloth(positions, faces, Material(), pins=(0, sheet_cells))
     return _built(scene, cloth, sheet_frames, cloth.rest_positions)
@@ -77,14 +82,20 @@ def build_hanging_sheet(
 def build_flag(scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames: int) -> BuiltScene:
     """Build the scene of a flag whose pole is swung to and fro: its pinned edge alone moves it."""
     flat, faces = square_sheet(sheet_cells, SIZE)
-    positions = np.stack([flat[:, 0], -flat[:, 2], flat[:, 1]], axis=1)  # upright, in the plane of x and y
+    positions = np.stack(
+        [flat[:, 0], -flat[:, 2], flat[:, 1]], axis=1
+    )  # upright, in the plane of x and y
     pole = np.arange(sheet_cells + 1)  # the edge at the smallest x
     cloth = Cloth(positions, faces, Material(), pins=pole)
 
     def handles(frame: int) -> np.ndarray:
         """Return the pole in a frame, (P,3) [m]: it starts from rest, so that the first frame has no jolt."""
         phase = 2.0 * np.pi * frame * DT / PERIOD
-        return positions[pole] + [0.0, 0.0, SWING * np.sin(phase) * (1.0 - np.cos(min(phase, np.pi))) / 2.0]
+        return positions[pole] + [
+            0.0,
+            0.0,
+            SWING * np.sin(phase) * (1.0 - np.cos(min(phase, np.pi))) / 2.0,
+        ]
 
     return _built(scene, cloth, sheet_frames, positions, pin_positions=handles)
 

@@ -38,9 +38,9 @@ class Measurement:
 class Case:
     """Declaration of one row: function, expected value and tolerance. `reason` defends the tolerance.
 
-    `function` of `module`, called with `options`, returns a number, (measured, expected) where the reference
-    has to be solved first, a Measurement, or any of these by name of the case. A number without a tolerance
-    is reported, not judged.
+    `function` of `module`, called with `options`, returns a number, (measured, expected) where the
+    reference has to be solved first, a Measurement, or any of these by name of the case. A number without
+    a tolerance is reported, not judged.
 
     Attributes:
         name: unique over all cases, and the row's scene unless `scene` is given.
@@ -49,8 +49,8 @@ class Case:
         long: whether it is left out where no suite is named.
         seconds: after which the case's process is ended; None: never.
         method: of its row.
-        process: where it has a name, the case is timed: it runs alone on the machine, in the process of this
-            name, after others of this name.
+        process: where it has a name, the case is timed: it runs alone on the machine, in the process of
+            this name, after others of this name.
     """
 
     name: str
@@ -102,9 +102,13 @@ class Case:
         reason = ""
         if self.tolerance is not None and expected is None:
             reason = "a tolerance, but nothing to compare with"
-        elif self.tolerance is not None and expected is not None and abs(value - expected) > self.tolerance:
+        elif (
+            self.tolerance is not None and expected is not None and abs(value - expected) > self.tolerance
+        ):
             reason = f"{value:.6g} is further than {self.tolerance:g} from {expected:g} ({self.reason})"
-        return Measurement(value=value, status="failed" if reason else "ok", reason=reason, expected=expected)
+        return Measurement(
+            value=value, status="failed" if reason else "ok", reason=reason, expected=expected
+        )
 
 
 _declared: dict[str, list[Case]] = defaultdict(list)  # by module
@@ -115,9 +119,9 @@ def known_answer(
 ) -> Callable[[Function], Function]:
     """Declare a function as one or more cases: their names, or name -> options of the function.
 
-    Without names the case has the function's; for several cases at once it returns name -> number. What its
-    docstring says that it returns describes the case unless `description` does. declared: further fields of
-    Case.
+    Without names the case has the function's; for several cases at once it returns name -> number. What
+    its docstring says that it returns describes the case unless `description` does. declared: further
+    fields of Case.
 
     >>> @known_answer({"sum of two": {"count": 2}, "sum of three": {"count": 3}}, unit="1", tolerance=1e-12)
     ... def sums_of_odd_numbers(count):

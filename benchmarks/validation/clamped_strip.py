@@ -2,11 +2,13 @@
 
     theta'' = -(weight (1 - s) + load) cos theta,   theta(0) = 0, theta'(1) = 0
 
-with theta downwards, s from the clamp over the length L, weight Gamma = rho_a g L^3 / D and load P L^2 / D.
+with theta downwards, s from the clamp over the length L, weight Gamma = rho_a g L^3 / D and load P L^2 /
+D.
 
 Hinges stand for a plate stiffness D that depends on the mesh (see plates.py), and the clamp, two pinned
-columns of vertices, acts somewhere between them: the triangles between them cannot bend. Both follow from one
-linear solve, the small deflection w of the strip under a unit load per area and its slope w' at the tip:
+columns of vertices, acts somewhere between them: the triangles between them cannot bend. Both follow from
+one linear solve, the small deflection w of the strip under a unit load per area and its slope w' at the
+tip:
 
     w = l^4 / (8 D),   w' = l^3 / (6 D)   =>   l = 4 w / (3 w'),   D = l^4 / (8 w)
 

@@ -32,7 +32,9 @@ def penalty_depth() -> float:
     return float(((contact.margin - x[:, 1]) / exact).mean())
 
 
-@known_answer(expected=3.0, tolerance=1e-12, reason="vertices, edges and faces carry it once each; round-off")
+@known_answer(
+    expected=3.0, tolerance=1e-12, reason="vertices, edges and faces carry it once each; round-off"
+)
 def contact_sampled_area() -> float:
     """Return the area of all contact samples of a sheet over its own: each kind carries it once."""
     contact = energies.ContactPenalty(flat_cloth(*jittered_patch(8)))
@@ -75,9 +77,9 @@ PULL = 2.0  # [N/m] at its ends, about, so that it never hangs slack
 class RoundBody:
     """Sphere about the origin, or (axis=2) cylinder about the z axis, of `radius` [m]; an exact `Obstacle`.
 
-    Its centre is at `heights` (T,) [m], frame by frame. It turns about z by `turn` [rad] a frame: its face
-    has the turned unit vectors as corners, so that "barycentric" coordinates on it are the coordinates of a
-    point in the frame that turns.
+    Its centre is at `heights` (T,) [m], frame by frame. It turns about z by `turn` [rad] a frame: its
+    face has the turned unit vectors as corners, so that "barycentric" coordinates on it are the
+    coordinates of a point in the frame that turns.
     """
 
     fingerprint = "round"
@@ -105,7 +107,9 @@ class RoundBody:
         radial = points * self.keep
         normals = radial / np.linalg.norm(radial, axis=1, keepdims=True)
         skin = points - radial + self.radius * normals
-        return Planes(skin + centre, normals, np.zeros(len(points), dtype=np.int64), skin @ self.at(frame).T)
+        return Planes(
+            skin + centre, normals, np.zeros(len(points), dtype=np.int64), skin @ self.at(frame).T
+        )
 
 
 @known_answer(expected=1.0, tolerance=2e-3, reason="second order in dt; the point's depth over R")
@@ -115,7 +119,9 @@ def leaving_point() -> float:
     return (2 * fine - coarse) / (2 / 3 * np.cos(START))
 
 
-@known_answer(expected=1.0, tolerance=0.15, reason="backward Euler; the place is extrapolated from the force")
+@known_answer(
+    expected=1.0, tolerance=0.15, reason="backward Euler; the place is extrapolated from the force"
+)
 def leaving_order() -> float:
     """Return the order in dt of where a point leaves a sphere."""
     return order(lambda rate: abs(_leaving(rate) - 2 / 3 * np.cos(START)), (240, 480, 960))
@@ -127,7 +133,9 @@ def _leaving(rate: int) -> float:
 
     The point is a triangle of 4 mm. It starts at rest, as deep in the margin as its weight presses it.
     """
-    corners = 0.004 / 3**0.5 * np.array([[np.cos(a), 0.0, np.sin(a)] for a in 2 * np.pi / 3 * np.arange(3)])
+    corners = (
+        0.004 / 3**0.5 * np.array([[np.cos(a), 0.0, np.sin(a)] for a in 2 * np.pi / 3 * np.arange(3)])
+    )
     cloth = sim.Cloth(corners, np.array([[0, 2, 1]]), COTTON)
     contact = energies.ContactPenalty(cloth, samples="vertices", stiffness=HARD)
     density = contact.stiffness[0] / contact.sample_areas[0]
@@ -168,8 +176,8 @@ def drum_pressure() -> float:
 def _strip_on_drum() -> tuple[np.ndarray, ...]:
     """Return tension [N/m] and pressure [N/m^2] along a strip whose ends are held: ours, exact, each.
 
-    Without friction only weight changes the tension N along the strip: dN/ds = w dy/ds, and an arc of radius
-    R under tension N presses with N/R + w cos phi, where phi is the angle from the top.
+    Without friction only weight changes the tension N along the strip: dN/ds = w dy/ds, and an arc of
+    radius R under tension N presses with N/R + w cos phi, where phi is the angle from the top.
     """
     from reference_sim.energies.contact_penalty import DEFAULT_STIFFNESS
 
@@ -199,9 +207,9 @@ def _strip_on_drum() -> tuple[np.ndarray, ...]:
 def strip_over_drum(columns: int, stiffness: float) -> tuple[sim.Cloth, np.ndarray, np.ndarray]:
     """Return a strip held at both ends, its points in the plane (V,2), and on the drum (V,3) [m].
 
-    It is pulled by PULL, and its ends hang straight down. stiffness: of contact [J/m^5], by which it lies in
-    the margin. The strip is a hundred times stiffer than cotton: it keeps its length, and the exact formulas
-    need no stretch.
+    It is pulled by PULL, and its ends hang straight down. stiffness: of contact [J/m^5], by which it lies
+    in the margin. The strip is a hundred times stiffer than cotton: it keeps its length, and the exact
+    formulas need no stretch.
     """
     from reference_sim.energies.contact_penalty import DEFAULT_MARGIN
 

@@ -65,7 +65,9 @@ def _in_disorder(term: str) -> tuple[energies.Energy, np.ndarray]:
     return make[term](), x
 
 
-def _all_in_contact(cloth: sim.Cloth, x: np.ndarray, random: np.random.Generator) -> energies.ContactPenalty:
+def _all_in_contact(
+    cloth: sim.Cloth, x: np.ndarray, random: np.random.Generator
+) -> energies.ContactPenalty:
     """Return contact of every sample, deep in a margin of a metre, against a plane of its own."""
     contact = energies.ContactPenalty(cloth, margin=1.0, stiffness=1.0)
     samples = contact.sample_matrix @ x

@@ -35,12 +35,17 @@ def free_fall() -> float:
 
     scene = sheets.build_free_fall(FALL, sheet_cells=14, sheet_frames=45)
     assert scene.exact is not None
-    x = motion(scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, velocity=scene.start_velocity)
+    x = motion(
+        scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, velocity=scene.start_velocity
+    )
     return farthest(x, scene.exact)
 
 
 @known_answer(
-    unit="m", expected=0.0, tolerance=1e-9, reason="round-off of the times at which the pins are asked for"
+    unit="m",
+    expected=0.0,
+    tolerance=1e-9,
+    reason="round-off of the times at which the pins are asked for",
 )
 def moving_pins_in_substeps() -> float:
     """Return the distance of a sheet pulled by its pins, four steps a frame, to that of a quarter of dt."""
@@ -52,7 +57,9 @@ def moving_pins_in_substeps() -> float:
 
     def between(step: int) -> np.ndarray:
         frame, part = divmod(step, steps)
-        return places + pulled[frame] + part / steps * (pulled[min(frame + 1, frames - 1)] - pulled[frame])
+        return (
+            places + pulled[frame] + part / steps * (pulled[min(frame + 1, frames - 1)] - pulled[frame])
+        )
 
     run = partial(motion, scene.cloth, scene.energies, start=scene.start)
     coarse = run(dt=scene.dt, frames=frames, substeps=steps, pin_positions=lambda n: places + pulled[n])
@@ -65,8 +72,8 @@ def stretched_membrane_vibration() -> float:
     """Return the largest error of a stretched membrane's lowest mode over 30 steps, over its first amplitude.
 
     The square of 1 m is held at its border. With stretch s, spacing h and lumped masses
-    S = (lam + mu)(s^2 - 1), omega^2 = (S/rho_a) (4/h^2) 2 sin^2(pi h/2), and the discrete motion of the mode
-    is z_{n+1} = (2 z_n - z_{n-1}) / (1 + omega^2 dt^2).
+    S = (lam + mu)(s^2 - 1), omega^2 = (S/rho_a) (4/h^2) 2 sin^2(pi h/2), and the discrete motion of the
+    mode is z_{n+1} = (2 z_n - z_{n-1}) / (1 + omega^2 dt^2).
     """
     amplitude, frames, cells, s = 1e-5, 31, 8, 1.2
     points, faces = right_grid(cells, cells, 1.0, 1.0)
@@ -127,8 +134,8 @@ def _thrown_sheet() -> tuple[np.ndarray, sim.Cloth]:
 def unique_step() -> float:
     """Return the largest distance of the ends of one step, thrown into disorder, from two far guesses.
 
-    The membrane's Hessian is never below -(lambda + mu) times the cotangent Laplacian, so a step shorter than
-    h (rho_a / (8 (lambda + mu)))^0.5 on right triangles of spacing h has one minimiser and no other.
+    The membrane's Hessian is never below -(lambda + mu) times the cotangent Laplacian, so a step shorter
+    than h (rho_a / (8 (lambda + mu)))^0.5 on right triangles of spacing h has one minimiser and no other.
     At 1/30 s, far above that bound, two valid solvers may differ.
     """
     bound = SPACING * np.sqrt(COTTON.areal_density / 8 / (COTTON.lame_lambda + COTTON.lame_mu))
@@ -139,15 +146,17 @@ def unique_step() -> float:
     random = np.random.default_rng(5)
     inertia.x_hat = cloth.rest_positions + random.normal(0, 0.3 * SPACING, cloth.rest_positions.shape)
     starts = (random.uniform(-size, size, cloth.rest_positions.shape) for _ in range(2))
-    return farthest(*(minimum([energies.StretchStVK(cloth), inertia], x, tolerance=1e-12) for x in starts))
+    return farthest(
+        *(minimum([energies.StretchStVK(cloth), inertia], x, tolerance=1e-12) for x in starts)
+    )
 
 
 @known_answer(expected=0.0, tolerance=1e-9, reason="backward Euler only ever loses energy; round-off")
 def energy_inequality() -> float:
     """Return the largest excess of Phi' + |v' - v|_M^2/2 over Phi + |v|_M^2/2, over the kinetic energy.
 
-    Both sides are the step's objective, at its end and at the previous positions: a step that ends above the
-    place it came from is wrong. Measured on the hanging sheet.
+    Both sides are the step's objective, at its end and at the previous positions: a step that ends above
+    the place it came from is wrong. Measured on the hanging sheet.
     """
     from benchmarks.scenes import sheets
 

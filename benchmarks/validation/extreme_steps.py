@@ -1,12 +1,13 @@
 """Stiff and extreme steps of a small sheet: each converges truly, or fails and says so.
 
 The energy may not rise, everything is finite, and a claim of convergence is true by a path that shares no
-kernel with the solver (convergence_check.py). A false claim, a NaN, a crash and a hang are failed rows; an
-honest "stalled", "diverged" or "timeout" keeps that name and its reason. What stands in a case's options is
-all that differs from an ordinary step of 1/30 s of a sheet 0.4 m wide, 81 vertices, held at two corners.
+kernel with the solver (convergence_check.py). A false claim, a NaN, a crash and a hang are failed rows;
+an honest "stalled", "diverged" or "timeout" keeps that name and its reason. What stands in a case's
+options is all that differs from an ordinary step of 1/30 s of a sheet 0.4 m wide, 81 vertices, held at
+two corners.
 
-Starts that are symmetric to the last bit are saddles of the energy: they are perturbed by a micrometre, but
-for `flat` and `point`, which are saddles on purpose.
+Starts that are symmetric to the last bit are saddles of the energy: they are perturbed by a micrometre,
+but for `flat` and `point`, which are saddles on purpose.
 """
 
 from __future__ import annotations
@@ -75,7 +76,9 @@ STARTS: dict[str, Start] = {  # of the rest positions of a horizontal sheet abou
     "twisted": twisted,
     "collapsed triangle": collapsed_triangle,
 }
-VELOCITIES: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = {  # of positions and rest positions
+VELOCITIES: dict[
+    str, Callable[[np.ndarray, np.ndarray], np.ndarray]
+] = {  # of positions and rest positions
     "falling at 90 m/s": lambda x, rest: np.tile([0.0, -90.0, 0.0], (len(x), 1)),
     "spinning at 500 rad/s": lambda x, rest: 500.0 * np.cross([0.0, 1.0, 0.0], x),
     "closing at 30 rad/s": lambda x, rest: np.outer(-30.0 * np.maximum(rest[:, 0], 0.0), [0.0, 1.0, 0.0]),
@@ -216,7 +219,9 @@ def sheet_step(
     x[cloth.pins], v[cloth.pins] = rest[cloth.pins], 0.0
     declared: list[energies.Energy] = [energies.StretchStVK(cloth)] if "membrane" in terms else []
     if "bending" in terms:
-        angles = random.uniform(-np.pi, np.pi, len(cloth.hinges)) if rest_angles == "random" else rest_angles
+        angles = (
+            random.uniform(-np.pi, np.pi, len(cloth.hinges)) if rest_angles == "random" else rest_angles
+        )
         declared.append(energies.BendHinge(cloth, rest_angles=angles))
     if "area" in terms:
         declared.append(energies.AreaBarrier(cloth, stiffness=100.0 * stiffness))

@@ -1,19 +1,21 @@
 """Known answers of Coulomb friction: a patch on a slope, a belt and a table, a capstan.
 
-Patch: all vertices press alike, for k and the mass are per area, so it keeps its shape and moves as a point.
-With u its slip speed over that of the smoothing, a step of backward Euler on a slope of tan(a) = r mu is
+Patch: all vertices press alike, for k and the mass are per area, so it keeps its shape and moves as a
+point. With u its slip speed over that of the smoothing, a step of backward Euler on a slope of tan(a) = r
+mu is
 
     u' = u + c (r - f'(u')),   c = dt mu g cos a / speed,   f'(u) = 2 u - u^2 for u < 1, else 1     (1)
 
-Below the angle of friction it creeps at 1 - sqrt(1 - r) of the smoothing's speed, above it the path is that
-of a constant force.
+Below the angle of friction it creeps at 1 - sqrt(1 - r) of the smoothing's speed, above it the path is
+that of a constant force.
 
-Capstan: a strip held at both ends over a drum that turns under it. Once the tension has found its profile the
-friction of each vertex is mu N on its own tangent. Where the strip turns by b, forces balance where
+Capstan: a strip held at both ends over a drum that turns under it. Once the tension has found its profile
+the friction of each vertex is mu N on its own tangent. Where the strip turns by b, forces balance where
 
     (T2 - T1) cos(b/2) = mu N,    (T2 + T1) sin(b/2) = N,    T2/T1 = (1 + mu tan(b/2))/(1 - mu tan(b/2))
 
-which over a turn of phi is exp(mu phi) (Euler, Eytelwein), but for mu (1 + mu^2) phi b^2/12 in its logarithm.
+which over a turn of phi is exp(mu phi) (Euler, Eytelwein), but for mu (1 + mu^2) phi b^2/12 in its
+logarithm.
 """
 
 from __future__ import annotations
@@ -66,16 +68,21 @@ def belt_path(substeps: int = 1) -> float:
     along = np.array([BELT * DT, 0.0, 0.0]) * np.arange(16)[:, None, None]
     path = _patch(carried=along, frames=16, substeps=substeps)[:, 0]
     dt = DT / substeps
-    behind = _slip(BELT / SPEED, 0.0, dt * MU * sim.GRAVITY / SPEED, steps=15 * substeps, dt=dt)[::substeps]
+    behind = _slip(BELT / SPEED, 0.0, dt * MU * sim.GRAVITY / SPEED, steps=15 * substeps, dt=dt)[
+        ::substeps
+    ]
     return float(np.abs(path - path[0] - (along[:, 0, 0] - behind)).max())
 
 
-@known_answer(expected=1.0, tolerance=1e-9, reason="what is left of its bounce, and the residual gradient")
+@known_answer(
+    expected=1.0, tolerance=1e-9, reason="what is left of its bounce, and the residual gradient"
+)
 def friction_landing() -> float:
     """Return the speed that a sliding patch keeps when it lands, over v - mu (v_n + g t).
 
-    The table gives it the momentum m (v_n + g t) upwards, and takes mu times that of its sliding. Friction
-    is a step late, but loses nothing: the force before the first step is that of the last, its weight.
+    The table gives it the momentum m (v_n + g t) upwards, and takes mu times that of its sliding.
+    Friction is a step late, but loses nothing: the force before the first step is that of the last, its
+    weight.
     """
     path = _patch(frames=16, velocity=np.array([THROWN, -FALLING, 0.0]))
     kept = THROWN - MU * (FALLING + sim.GRAVITY * 15 * DT)
@@ -111,8 +118,8 @@ def _patch(
 ) -> np.ndarray:
     """Return the path (frames, 3) [m] of the middle of a patch on the plane y = 0, both turned by `turn`.
 
-    It starts as deep in the margin as its weight presses it, with a velocity (3,) [m/s]. The plane moves by
-    carried (T, 1, 3) [m].
+    It starts as deep in the margin as its weight presses it, with a velocity (3,) [m/s]. The plane moves
+    by carried (T, 1, 3) [m].
     """
     from reference_sim.energies.contact_penalty import DEFAULT_STIFFNESS
 

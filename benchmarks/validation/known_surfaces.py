@@ -59,7 +59,9 @@ def curvature_order(surface: str) -> float:
     return order(error, (fewest, 2 * fewest, 4 * fewest))
 
 
-@known_answer(unit="1/m", expected=5.0, tolerance=1e-9, reason="exact for vertices on a circle; round-off")
+@known_answer(
+    unit="1/m", expected=5.0, tolerance=1e-9, reason="exact for vertices on a circle; round-off"
+)
 def curvature_cylinder() -> float:
     """Return the mean of H over interior vertices of a cylinder of radius 0.1 m: 1/(2 R) = 5."""
     x, faces = cylinder_patch(40, 0.1)

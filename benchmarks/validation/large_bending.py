@@ -1,16 +1,18 @@
 """Large bending with a known answer: elastica, catenary, lateral buckling, slit annulus.
 
-Catenary, with lambda = 0: a string of force N = E2 s (s^2 - 1)/2 per width at stretch s, whose weight gives
-the force at each of its points; integrated by scipy.
+Catenary, with lambda = 0: a string of force N = E2 s (s^2 - 1)/2 per width at stretch s, whose weight
+gives the force at each of its points; integrated by scipy.
 
-Lateral buckling: a strip on edge, clamped at one end, gives way sideways under P = 4.0126 (EI GJ)^0.5 / L^2
-at the other end (Michell 1899, Prandtl 1899), or 12.85 (EI GJ)^0.5 / L^2 spread evenly over the length
-(Timoshenko and Gere, Theory of Elastic Stability), the limit of narrow strips of the test of Romero et al.
+Lateral buckling: a strip on edge, clamped at one end, gives way sideways under P = 4.0126 (EI GJ)^0.5 /
+L^2 at the other end (Michell 1899, Prandtl 1899), or 12.85 (EI GJ)^0.5 / L^2 spread evenly over the
+length (Timoshenko and Gere, Theory of Elastic Stability), the limit of narrow strips of the test of
+Romero et al.
 2021. Of a narrow strip of width b on equilateral triangles EI = D (1 - nu^2) b and GJ = 2 D (1 - nu) b.
 
-Slit annular plate (Sze, Liu and Lo 2004): clamped at one lip of the slit, the other lifted by a line load.
-Equilateral triangles are mapped to the annulus by exp, which is conformal. Such a plate has nu = -1/3, and
-the energy of Gaussian curvature makes it one of nu = 0; without that term the load lifts it less.
+Slit annular plate (Sze, Liu and Lo 2004): clamped at one lip of the slit, the other lifted by a line
+load. Equilateral triangles are mapped to the annulus by exp, which is conformal. Such a plate has nu =
+-1/3, and the energy of Gaussian curvature makes it one of nu = 0; without that term the load lifts it
+less.
 """
 
 from __future__ import annotations
@@ -29,7 +31,9 @@ from reference_sim import energies
 
 ELASTICA_STIFFNESS = 1e-3  # [J] hinge stiffness
 # 330 N/m: at Gamma = 1000 the strip weighs 0.9 N per metre of width, and stretches by 0.3 %.
-ELASTICA_MATERIAL = sim.Material(young_modulus=700e3, poisson_ratio=0.0, bending_stiffness=ELASTICA_STIFFNESS)
+ELASTICA_MATERIAL = sim.Material(
+    young_modulus=700e3, poisson_ratio=0.0, bending_stiffness=ELASTICA_STIFFNESS
+)
 COLUMNS = 120
 ELASTICA = partial(
     known_answer, smoke=False, expected=0.0, reason="120 cells, their error halves with the cell"
@@ -70,7 +74,9 @@ def bent_strip(
     },
     tolerance=3e-3,
 )
-@ELASTICA({f"heavy_elastica_{weight:g}": {"weight": weight} for weight in (100.0, 1000.0)}, tolerance=6e-3)
+@ELASTICA(
+    {f"heavy_elastica_{weight:g}": {"weight": weight} for weight in (100.0, 1000.0)}, tolerance=6e-3
+)
 @ELASTICA({"heavy_elastica_1": {"weight": 1.0}}, tolerance=1e-4)
 def tip_distance(weight: float = 0.0, load: float = 0.0) -> float:
     """Return the distance of a cantilever's tip to the elastica, over its length, worst of the families.
@@ -180,7 +186,9 @@ def _ratio(rows: int, where: str, slender: float) -> float:
         forces[:, 1] = -exact * cloth.vertex_areas / width
     else:
         tip = np.flatnonzero(points[:, 0] > 1 - 1e-9)
-        share = 1.0 - (2 * np.abs(points[tip, 1]) / width) ** 2  # shear of a beam: least at the free edges
+        share = (
+            1.0 - (2 * np.abs(points[tip, 1]) / width) ** 2
+        )  # shear of a beam: least at the free edges
         forces[tip, 1] = -exact * share / share.sum()
     return buckling_factor(cloth, forces)
 
@@ -194,7 +202,9 @@ def buckling_factor(cloth: sim.Cloth, forces: np.ndarray) -> float:
     import scipy.sparse.linalg as spla
 
     strain, stiff = energies.StretchStVK(cloth), energies.BendHinge(cloth)
-    stiff.stiffness = 1e5 * stiff.stiffness  # keeps the loaded strip in its plane, where hinges do no work
+    stiff.stiffness = (
+        1e5 * stiff.stiffness
+    )  # keeps the loaded strip in its plane, where hinges do no work
     flat = minimum([strain, stiff, DeadLoad(cloth, forces)], cloth.rest_positions, tolerance=1e-9)
     free = np.flatnonzero(cloth.free)
 
@@ -252,7 +262,9 @@ def lifted(
     columns = round(2 * np.pi / width * rows * (ROW if family == "equilateral" else 1.0))
     flat, faces = rectangle(family, columns, rows, 2 * np.pi, width)
     h = 2 * np.pi / (columns - 0.5)
-    turn = flat[:, 0] * columns / (columns - 0.5) - h / 2  # the clamp: half-way between two pinned columns
+    turn = (
+        flat[:, 0] * columns / (columns - 0.5) - h / 2
+    )  # the clamp: half-way between two pinned columns
     radius = INNER * np.exp(flat[:, 1])
     rest = np.stack([radius * np.cos(turn), 0.0 * turn, -radius * np.sin(turn)], axis=1)
     cloth = sim.Cloth(rest, faces, material, pins=np.flatnonzero(turn < 0.6 * h))

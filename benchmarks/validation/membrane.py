@@ -2,11 +2,12 @@
 
     G = (F^T F - 1) / 2,   S = lambda tr(G) 1 + 2 mu G
 
-F is (d, 2, ...), the gradient of the positions; G and S are (2, 2, ...). No code is shared with the energies.
+F is (d, 2, ...), the gradient of the positions; G and S are (2, 2, ...). No code is shared with the
+energies.
 
 Manufactured: forces that make x(X, Y) = (1.15 X + 0.04 b, 1.1 Y + 0.05 X Y (1 - Y), 0.15 b), b = sin pi X
-sin pi Y, an equilibrium, f_a = int P(grad x) grad phi_a by quadrature of order 8. What the mesh makes of it
-may differ by the error of linear triangles alone: h^2 in the mean square, h in the gradient.
+sin pi Y, an equilibrium, f_a = int P(grad x) grad phi_a by quadrature of order 8. What the mesh makes of
+it may differ by the error of linear triangles alone: h^2 in the mean square, h in the gradient.
 """
 
 from __future__ import annotations
@@ -57,7 +58,9 @@ def vector_basis(points: np.ndarray, faces: np.ndarray, intorder: int) -> Any:
 
 STRETCH, SHEAR = 1.3, 0.4
 NARROWED = COTTON.lame_lambda / (COTTON.lame_lambda + 2 * COTTON.lame_mu)  # nu2
-UNIAXIAL = np.diag([STRETCH, np.sqrt(1 - NARROWED * (STRETCH**2 - 1))])  # the lateral stretch of no stress
+UNIAXIAL = np.diag(
+    [STRETCH, np.sqrt(1 - NARROWED * (STRETCH**2 - 1))]
+)  # the lateral stretch of no stress
 
 
 @known_answer(

@@ -26,7 +26,9 @@ def newton_quadratic() -> float:
     """Return the factorisations for inertia and weight alone: one to step, one to confirm the minimum."""
     cloth = _patch(5)
     inertia = energies.Inertia(cloth, 1 / 30)
-    inertia.x_hat = cloth.rest_positions + np.random.default_rng(0).normal(0, 0.1, cloth.rest_positions.shape)
+    inertia.x_hat = cloth.rest_positions + np.random.default_rng(0).normal(
+        0, 0.1, cloth.rest_positions.shape
+    )
     potential = sim.Potential([inertia, energies.Gravity(cloth)])
     result = demand_converged(sim.minimise(potential, cloth.rest_positions), "the minimiser")
     return float(result.factorisations)
@@ -38,7 +40,11 @@ def newton_order() -> float:
     potential, start = _stretched()
     end = minimum(potential.energies, start, tolerance=1e-13)
     errors = [
-        float(np.abs(sim.minimise(potential, start, max_iterations=k, tolerance=1e-13).positions - end).max())
+        float(
+            np.abs(
+                sim.minimise(potential, start, max_iterations=k, tolerance=1e-13).positions - end
+            ).max()
+        )
         for k in range(1, 12)
     ]
     near = [k for k in range(len(errors) - 1) if errors[k] < 1e-3 and errors[k + 1] > 1e-15]
@@ -91,8 +97,8 @@ class LogCosh(energies.Energy):
 def newton_wants_small_steps() -> float:
     """Return the edge lengths from rest at which the default tolerance leaves a very soft strip.
 
-    Its own weight, of a ten millionth of the Earth's gravity, is below that tolerance from the start; but the
-    strip sags by a fifth of an edge.
+    Its own weight, of a ten millionth of the Earth's gravity, is below that tolerance from the start; but
+    the strip sags by a fifth of an edge.
     """
     points, faces = right_grid(2, 20, 0.1, 1.0)
     material = sim.Material(bending_stiffness=1e-5)

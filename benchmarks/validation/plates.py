@@ -1,20 +1,20 @@
 """Hinges as bending: folded strips, the plate that they stand for, Gaussian curvature.
 
-Kirchhoff's plate has the energy D/2 [tr(S)^2 - 2 (1 - nu) det(S)] per area, S the curvature tensor. Hinges
-are no such plate: C11, the stiffness against bending about one axis, depends on the shape of the triangles,
-and on equilateral ones nu is -1/3 whatever the material. With theta = l (3^0.5/2) (w_nn - w_tt/3) at the
-edges of direction t, summed over the three directions of an equilateral mesh of spacing l:
-C11 = 3^0.5/2 k, C12 = -C11/3, C66 = k/3^0.5 where hinges are not scaled, and with l^2/(4 (A1 + A2)), there
-1/(2 3^0.5), C11 = k/4. No other family is isotropic (table in docs/notebook/simulator.md).
+Kirchhoff's plate has the energy D/2 [tr(S)^2 - 2 (1 - nu) det(S)] per area, S the curvature tensor.
+Hinges are no such plate: C11, the stiffness against bending about one axis, depends on the shape of the
+triangles, and on equilateral ones nu is -1/3 whatever the material. With theta = l (3^0.5/2) (w_nn -
+w_tt/3) at the edges of direction t, summed over the three directions of an equilateral mesh of spacing l:
+C11 = 3^0.5/2 k, C12 = -C11/3, C66 = k/3^0.5 where hinges are not scaled, and with l^2/(4 (A1 + A2)),
+there 1/(2 3^0.5), C11 = k/4. No other family is isotropic (table in docs/notebook/simulator.md).
 
 Squares with both diagonals, w = x^2/2 at the corners and d above that at the centres: per cell the hinges
-of the sides turn by 4 d +- 1/2 and those of the four half diagonals by 8^0.5 (1/8 - d), so the energy over
-k/2 is 1 - 8 d + 64 d^2, at least 3/4; scaled by l^2/(4 (A1 + A2)) it is 3/8 - 2 d + 24 d^2, at least 1/3.
-Alternating diagonals are the same tiling turned by 45 degrees: 3/4 again, and 5/24.
+of the sides turn by 4 d +- 1/2 and those of the four half diagonals by 8^0.5 (1/8 - d), so the energy
+over k/2 is 1 - 8 d + 64 d^2, at least 3/4; scaled by l^2/(4 (A1 + A2)) it is 3/8 - 2 d + 24 d^2, at least
+1/3. Alternating diagonals are the same tiling turned by 45 degrees: 3/4 again, and 5/24.
 
-Plates of one D that differ in nu differ by a multiple of the total curvature, the integral of K = det(S). On
-a mesh that is the sum of the angle defects of inner vertices (Descartes), and therefore a function of the
-border alone (Gauss and Bonnet):
+Plates of one D that differ in nu differ by a multiple of the total curvature, the integral of K = det(S).
+On a mesh that is the sum of the angle defects of inner vertices (Descartes), and therefore a function of
+the border alone (Gauss and Bonnet):
 
     sum of defects = 2 pi (inner vertices) - pi (faces) + sum of the face angles at border vertices
 """
@@ -155,7 +155,9 @@ def patch_energy(family: str, curvature: np.ndarray, terms: Terms) -> float:
     return (small - 2 * middle + large) / 128 / height
 
 
-def _bent(family: str, cells: int, height: float, curvature: np.ndarray, terms: Terms) -> tuple[float, float]:
+def _bent(
+    family: str, cells: int, height: float, curvature: np.ndarray, terms: Terms
+) -> tuple[float, float]:
     """Return the energy over k of a patch in equilibrium, and the area of its hinges."""
     import scipy.sparse.linalg as spla
 
@@ -174,8 +176,8 @@ def _bent(family: str, cells: int, height: float, curvature: np.ndarray, terms: 
 class GaussianCurvature(energies.Energy):
     """Energy E = c (total curvature - that of the flat rest state), summed over the corners on the border.
 
-    c = -NU D makes a plate of nu = 0 of hinges on equilateral triangles, D [J] their C11: the two energies
-    differ by D (nu_0 - nu) det(S) per area, nu_0 = 0 and nu that of the hinges.
+    c = -NU D makes a plate of nu = 0 of hinges on equilateral triangles, D [J] their C11: the two
+    energies differ by D (nu_0 - nu) det(S) per area, nu_0 = 0 and nu that of the hinges.
 
     Args:
         cloth: the rest state; it has to be flat.
@@ -186,7 +188,9 @@ class GaussianCurvature(energies.Energy):
 
     def __init__(self, cloth: sim.Cloth, stiffness: float) -> None:
         self.cloth = cloth
-        corners = np.stack([np.roll(cloth.faces, -k, axis=1) for k in range(3)], axis=1)  # tip, next, last
+        corners = np.stack(
+            [np.roll(cloth.faces, -k, axis=1) for k in range(3)], axis=1
+        )  # tip, next, last
         on_border = np.isin(cloth.faces, np.concatenate(boundary_loops(cloth.faces)))
         self.stencils = corners[on_border]
         self.stiffness = stiffness

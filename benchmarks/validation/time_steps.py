@@ -1,7 +1,8 @@
 """Known answers of time integration: a triangle that scipy solves, and the order of a sheet in dt.
 
-Pendulum: one triangle hangs by its base; by symmetry its third vertex stays half-way between the two pins,
-at a distance r from the base that was h at rest, with E(r) = A (lambda/2 + mu) G^2, G = ((r/h)^2 - 1)/2.
+Pendulum: one triangle hangs by its base; by symmetry its third vertex stays half-way between the two
+pins, at a distance r from the base that was h at rest, with E(r) = A (lambda/2 + mu) G^2, G = ((r/h)^2 -
+1)/2.
 """
 
 from __future__ import annotations
@@ -49,7 +50,9 @@ def _simulated_pendulum(
     return motion(cloth, terms, dt=dt, frames=frames, start=x, tolerance=1e-11)[:, 2, :2]
 
 
-@known_answer(unit="m", expected=0.0, tolerance=1e-10, reason="scipy's tolerance, 1e-12 a step, summed twice")
+@known_answer(
+    unit="m", expected=0.0, tolerance=1e-10, reason="scipy's tolerance, 1e-12 a step, summed twice"
+)
 def pendulum() -> float:
     """Return the largest distance of an elastic pendulum to its discrete steps solved by scipy, 60 steps."""
     from scipy.optimize import fsolve
@@ -66,7 +69,9 @@ def pendulum() -> float:
     return farthest(_simulated_pendulum(start, dt, 61), np.array(path[1:]))
 
 
-@known_answer(expected=1.0, tolerance=0.1, reason="backward Euler; its second order still shows at 1/480 s")
+@known_answer(
+    expected=1.0, tolerance=0.1, reason="backward Euler; its second order still shows at 1/480 s"
+)
 def time_step_order() -> float:
     """Return the order in dt of the pendulum's place after half a second; scipy integrates the reference."""
     from scipy.integrate import solve_ivp
@@ -100,7 +105,10 @@ def numerical_damping(frequency: float) -> tuple[float, float]:
     # omega^2 = 2 A (lambda/2 + mu)/(m h^2): made to fit by the step instead of the length.
     natural = np.sqrt(2 * RIGIDITY / MASS) / HEIGHT
     fitted_dt = dt * frequency / natural
-    path = _simulated_pendulum(np.array([HEIGHT + amplitude, 0.0]), fitted_dt, 31, gravity=0.0)[:, 0] - HEIGHT
+    path = (
+        _simulated_pendulum(np.array([HEIGHT + amplitude, 0.0]), fitted_dt, 31, gravity=0.0)[:, 0]
+        - HEIGHT
+    )
     velocity = np.diff(path)[-1] / fitted_dt
     left = np.hypot(path[-1], velocity / natural) / amplitude
     return float(left), float((1 + (frequency * dt) ** 2) ** -15)
@@ -109,7 +117,9 @@ def numerical_damping(frequency: float) -> tuple[float, float]:
 BALL = 0.1  # [m] radius
 
 
-@known_answer(expected=1.0, tolerance=0.1, reason="backward Euler; its second order still shows at 1/1200 s")
+@known_answer(
+    expected=1.0, tolerance=0.1, reason="backward Euler; its second order still shows at 1/1200 s"
+)
 def pressed_time_step_order() -> float:
     """Return the order in dt of a taut sheet that a ball, already in touch, is pressed into smoothly.
 

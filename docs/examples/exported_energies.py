@@ -75,7 +75,8 @@ class Exported:
             return [np.arange(len(faces))] * len(points)
         centroids = self.obstacle["rest_positions"][faces].mean(1)
         near = [
-            np.linalg.norm(centroids - point, axis=1) <= self.facts["contact_region_m"] for point in points
+            np.linalg.norm(centroids - point, axis=1) <= self.facts["contact_region_m"]
+            for point in points
         ]
         return [np.flatnonzero(mask if mask.any() else ~mask) for mask in near]
 

@@ -3,9 +3,9 @@
     python docs/examples/onnx_file.py snug-tshirt snug.onnx
 
 Inputs of the graph: `features` (D,) and `transforms` (J, 3, 4), as the methods of `DressedBody` of
-these names give them. Output: `positions` (V, 3) [m], relative to the pelvis. A network that carries a state
-has input `state`, zeros before the first frame, and output `next_state` too. Rest shape and skinning weights
-are inside.
+these names give them. Output: `positions` (V, 3) [m], relative to the pelvis. A network that carries a
+state has input `state`, zeros before the first frame, and output `next_state` too. Rest shape and
+skinning weights are inside.
 """
 
 import sys

@@ -44,7 +44,10 @@ def train(
     body = dressed.body.vertices(motion.poses, motion.translations)
     obstacle = Obstacle(body, dressed.body.faces, rest_positions=dressed.body.template)
     poses = torch.from_numpy(motion.poses.reshape(-1, 72)).float()
-    transforms, pelvis = dressed.transforms(motion.poses), torch.from_numpy(dressed.pelvis(motion)).float()
+    transforms, pelvis = (
+        dressed.transforms(motion.poses),
+        torch.from_numpy(dressed.pelvis(motion)).float(),
+    )
     module = network(dressed.vertices)
     torch.nn.init.zeros_(module[2].weight)
     torch.nn.init.zeros_(module[2].bias)  # begins as skinning alone
@@ -66,5 +69,7 @@ if __name__ == "__main__":
     shirt = find_template("tshirt").tailor(body, vertices=350)  # as preset smoke has it
     dressed = DressedBody(body, shirt)
     trained, energies = train(dressed, make_motion("05_01"), steps=60, seed=0)
-    print(f"mean energy of an update: {energies[0]:.3f} J at first, {np.mean(energies[-10:]):.3f} J at last")
+    print(
+        f"mean energy of an update: {energies[0]:.3f} J at first, {np.mean(energies[-10:]):.3f} J at last"
+    )
     torch.save(trained.state_dict(), "pose_network-0.pt")

@@ -5,9 +5,9 @@
 trains both for 22,000 steps (T-shirt of 1002 vertices, the 34 recorded training clips, seed 0), keeps the
 weights on the way, rolls them out and prints, for each motion and set of weights, the excess of the total
 energy over the converged simulation as a share of skinning's [%]: by the energies with the simulator's
-contact, each against the simulation with it, and by those with the recipe's contact, against the simulation
-with that one. Both simulations have the same start. What lies in DIR already is not computed again. The
-numbers are those of training.md#the-swap-of-contact.
+contact, each against the simulation with it, and by those with the recipe's contact, against the
+simulation with that one. Both simulations have the same start. What lies in DIR already is not computed
+again. The numbers are those of training.md#the-swap-of-contact.
 """
 
 from __future__ import annotations

@@ -4,9 +4,9 @@
 
 For each kappa L the weight Gamma grows from 0.1, and the planar shape is followed as far as there is one,
 then back from 1000. It takes five seconds of CPU time and prints the smallest eigenvalue of the second
-variation along the way, over that of torsion and bending without curvature or weight. A strip has C / B = 3
-and is 1000 times as stiff on edge; a round, incompressible rod has C / B = 2/3 and the same stiffness about
-both axes.
+variation along the way, over that of torsion and bending without curvature or weight. A strip has C / B =
+3 and is 1000 times as stiff on edge; a round, incompressible rod has C / B = 2/3 and the same stiffness
+about both axes.
 """
 
 from __future__ import annotations
@@ -63,7 +63,9 @@ if __name__ == "__main__":
                 if not shape.success:
                     break
                 s, y = shape.x, shape.y
-                found.append((gamma, [smallest(curvature, gamma, shape, *body) for body in BODIES.values()]))
+                found.append(
+                    (gamma, [smallest(curvature, gamma, shape, *body) for body in BODIES.values()])
+                )
             if not found:
                 continue
             for which, body in enumerate(BODIES):

@@ -2,9 +2,9 @@
 
     python docs/notebook/first_steps.py --vertices 4400 --steps 2000 --rules keras torch
 
-prints one line for each step of the table in training.md#the-start-of-the-papers-recipe: rules, step, loss
-and its terms [J a frame]; then the largest loss after step 200, and the largest rise: a loss over the
-smallest mean of 20 steps before it. One seed a process, as trainings leave memory behind.
+prints one line for each step of the table in training.md#the-start-of-the-papers-recipe: rules, step,
+loss and its terms [J a frame]; then the largest loss after step 200, and the largest rise: a loss over
+the smallest mean of 20 steps before it. One seed a process, as trainings leave memory behind.
 """
 
 from __future__ import annotations

@@ -1,8 +1,9 @@
 """Rates of false alarms and of misses of reports.compare: python docs/notebook/gate.py RUN_DIR COPIES [SEED].
 
-False alarms: a noisy copy of the run has other seeds (the values of each network, on a scale of logarithms,
-are drawn anew with the scatter that its seeds have, half of the variance alike in all motions), other members
-of the reference's ensemble, and times that scatter by 5 %. Misses: such a copy with one planted regression.
+False alarms: a noisy copy of the run has other seeds (the values of each network, on a scale of
+logarithms, are drawn anew with the scatter that its seeds have, half of the variance alike in all
+motions), other members of the reference's ensemble, and times that scatter by 5 %. Misses: such a copy
+with one planted regression.
 """
 
 from __future__ import annotations
@@ -54,7 +55,9 @@ class NoisyCopies:
                 scale = np.log(group["value"]) if positive else group["value"]
                 of_scene = scale.groupby(group["scene"])
                 mean, deviation = (of_scene.transform(f).to_numpy() for f in ("mean", "std"))
-                self.scatter.append(Scatter(group.index.to_numpy(), group["seed"], mean, deviation, positive))
+                self.scatter.append(
+                    Scatter(group.index.to_numpy(), group["seed"], mean, deviation, positive)
+                )
 
     def draw(self, random: np.random.Generator) -> pd.DataFrame:
         """Return the rows of one copy."""
@@ -73,7 +76,10 @@ class NoisyCopies:
 def planted(rows: pd.DataFrame, random: np.random.Generator) -> tuple[str, str, pd.DataFrame]:
     """Plant one regression; return its name, network and motion, and the rows."""
     strains = rows[
-        (rows["suite"] == "garments") & rows["usable"] & rows["seeded"] & (rows["metric"] == "energy/strain")
+        (rows["suite"] == "garments")
+        & rows["usable"]
+        & rows["seeded"]
+        & (rows["metric"] == "energy/strain")
     ]
     network = str(random.choice(strains["method"].unique()))
     scene = str(random.choice(strains[strains["method"] == network]["scene"].unique()))

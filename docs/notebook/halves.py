@@ -1,7 +1,7 @@
 """Cut a run in two halves of its motions and compare the verdicts: python docs/notebook/halves.py RUN_DIR.
 
-Prints each claim with its verdicts in the whole run and in both halves, and how many contradict each other:
-one half says that the claim holds, the other that it does not.
+Prints each claim with its verdicts in the whole run and in both halves, and how many contradict each
+other: one half says that the claim holds, the other that it does not.
 """
 
 from __future__ import annotations

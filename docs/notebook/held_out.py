@@ -37,7 +37,9 @@ def main() -> None:
     if options.first:
         print_first(dressed, motions)
         return
-    held_out = Validation(motions=[make_motion(name) for name in VALIDATION], every=options.every, patience=0)
+    held_out = Validation(
+        motions=[make_motion(name) for name in VALIDATION], every=options.every, patience=0
+    )
     for name in options.networks:
         training = TRAININGS[name]
 

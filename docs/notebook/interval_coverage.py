@@ -54,7 +54,9 @@ def main() -> None:
                 for scale in truth:
                     low, high = effect(one, zero, scale).interval
                     held[scale] += low <= off_scale(truth[scale], scale) <= high
-            print("coverage", motions, spread, {scale: held[scale] / times for scale in truth}, flush=True)
+            print(
+                "coverage", motions, spread, {scale: held[scale] / times for scale in truth}, flush=True
+            )
     for motions in (8, 20):
         for factor in (1.0, 1.02, 1.1, 1.5, 2.0):
             random, found = np.random.default_rng(7), Counter()

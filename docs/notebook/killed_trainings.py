@@ -1,11 +1,11 @@
 """Kills inside trainings of benchmarks.run: python docs/notebook/killed_trainings.py KILLS [SEED [...]].
 
 Further arguments are INTERVAL and STEPS.
-SNUG is trained at preset smoke, with STEPS steps and a checkpoint every INTERVAL seconds. At a random time
-after the training began SIGKILL ends the command alone, whose workers have to end by themselves, or all of
-its processes at once; then the same command is begun again, until the model is there. Its weights are
-compared with those of a run that nobody killed. A training that ends before all kills are done is followed by
-one with the next seed.
+SNUG is trained at preset smoke, with STEPS steps and a checkpoint every INTERVAL seconds. At a random
+time after the training began SIGKILL ends the command alone, whose workers have to end by themselves, or
+all of its processes at once; then the same command is begun again, until the model is there. Its weights
+are compared with those of a run that nobody killed. A training that ends before all kills are done is
+followed by one with the next seed.
 """
 
 from __future__ import annotations
@@ -129,7 +129,8 @@ def main(kills: int, seed: int = 0, interval: float = 3.0, steps: int = 1500) ->
             differ = [key for key, value in models[0].items() if not torch.equal(value, models[1][key])]
             same = not differ and models[0].keys() == models[1].keys()
             print(
-                f"training {number}: {len(models[0])} tensors, equal bit for bit: {same} {differ}", flush=True
+                f"training {number}: {len(models[0])} tensors, equal bit for bit: {same} {differ}",
+                flush=True,
             )
             if len(done) == kills:
                 break

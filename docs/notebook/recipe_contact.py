@@ -7,8 +7,8 @@
 `reports.statistics.relative_excess.Excess.by_motion` of that run gives the numbers of
 training.md#the-contact-of-the-papers-recipe.
 Everything but contact is the reference's: terms, start, time step and tolerance. Contact is that of the
-recipe, whole or with one or two constants replaced by the reference's. The run measures these simulations as
-it measures every method: by the contact of the scene.
+recipe, whole or with one or two constants replaced by the reference's. The run measures these simulations
+as it measures every method: by the contact of the scene.
 """
 
 from __future__ import annotations

@@ -2,10 +2,11 @@
 
     python docs/notebook/roofline.py [VERTICES]
 
-A frame reads every weight once and does one multiplication and one addition with it, so it takes at least as
-long as reading them. The bound is the least time of a dot product of as many numbers, warm, on the same core;
-that of arithmetic, by a large matrix product, is far lower. Prints, for each network with random weights:
-megabytes of weights, the bound by reading, the bound by arithmetic, the median frame, and frame over bound.
+A frame reads every weight once and does one multiplication and one addition with it, so it takes at least
+as long as reading them. The bound is the least time of a dot product of as many numbers, warm, on the
+same core; that of arithmetic, by a large matrix product, is far lower. Prints, for each network with
+random weights: megabytes of weights, the bound by reading, the bound by arithmetic, the median frame, and
+frame over bound.
 """
 
 import sys

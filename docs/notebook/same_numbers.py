@@ -3,9 +3,10 @@
     python docs/notebook/same_numbers.py record CHECKOUT OUT.json [PART ...]
     python docs/notebook/same_numbers.py compare BEFORE.json AFTER.json
 
-Without PART all parts are recorded: three runs (rows, curves, roll-outs, networks), a short training by each
-recipe, and the energies that a test keeps. Rows about time and memory are left out. Every process has one
-thread. `compare` prints each difference and counts the values; it exits with 1 where two values differ.
+Without PART all parts are recorded: three runs (rows, curves, roll-outs, networks), a short training by
+each recipe, and the energies that a test keeps. Rows about time and memory are left out. Every process
+has one thread. `compare` prints each difference and counts the values; it exits with 1 where two values
+differ.
 """
 
 from __future__ import annotations
@@ -26,8 +27,8 @@ import numpy as np
 
 Record = dict[str, dict[str, str]]  # name of a result -> field -> its value as text
 
-# What may be called otherwise in another version: options of a run, places that a name is imported from. Of
-# several the first is taken that the checkout knows, so that one table serves both versions.
+# What may be called otherwise in another version: options of a run, places that a name is imported from.
+# Of several the first is taken that the checkout knows, so that one table serves both versions.
 FURTHER = (
     "simulation,santesteban2019,tailornet,nearest-poses,pose-regression,handles-20,ncs,ncs-static,"
     "handles-80-dynamic,pbns-springs,snug-floor,handles-20-floor,snug+cleanup,snug-data-converged-12,"
@@ -75,7 +76,9 @@ def find(name: str) -> Any:
 def digest(array: np.ndarray) -> str:
     """Return shape, type and a digest of the bytes of an array."""
     shape = "x".join(map(str, array.shape))
-    return f"{shape} {array.dtype} {hashlib.sha256(np.ascontiguousarray(array).tobytes()).hexdigest()[:16]}"
+    return (
+        f"{shape} {array.dtype} {hashlib.sha256(np.ascontiguousarray(array).tobytes()).hexdigest()[:16]}"
+    )
 
 
 def record_run(forms: Iterable[str]) -> Record:
@@ -113,7 +116,8 @@ def rows_of(folder: Path) -> Record:
         if row["unit"] not in CLOCKS and not row["metric"].startswith("cost/")
     }
     return {
-        name: {column: row[column] for column in COLUMNS if row.get(column)} for name, row in named.items()
+        name: {column: row[column] for column in COLUMNS if row.get(column)}
+        for name, row in named.items()
     }
 
 
@@ -126,7 +130,9 @@ def frame_energies_of(folder: Path) -> Record:
     with path.open(newline="", encoding="utf-8") as stream:
         lines = list(csv.DictReader(stream))
     return {
-        "frame " + " ".join(line[key] for key in keys): {n: v for n, v in line.items() if v and n not in keys}
+        "frame " + " ".join(line[key] for key in keys): {
+            n: v for n, v in line.items() if v and n not in keys
+        }
         for line in lines
     }
 
@@ -167,7 +173,9 @@ def record_trainings() -> Record:
         targets = targets or {m.name: snug.roll_out(model, dressed, m).positions for m in motions}
         weights = {n: digest(tensor.numpy()) for n, tensor in model.network.state_dict().items()}
         losses = {
-            f"last {n}": repr(value) for n, value in model.history[-1].items() if not n.startswith("seconds")
+            f"last {n}": repr(value)
+            for n, value in model.history[-1].items()
+            if not n.startswith("seconds")
         }
         record[f"training {name}"] = weights | losses
         print(f"{name}: {len(weights)} tensors", file=sys.stderr, flush=True)
@@ -220,7 +228,9 @@ def compare(before: Record, after: Record) -> bool:
         for name in sorted(set(fields)):
             print(f"{title}: {name}")
         print(f"{len(fields)} values {title}")
-    print(f"{len(shared)} values compared: {len(shared) - len(differing)} equal, {len(differing)} not equal")
+    print(
+        f"{len(shared)} values compared: {len(shared) - len(differing)} equal, {len(differing)} not equal"
+    )
     return not differing
 
 

@@ -3,8 +3,8 @@
     python docs/notebook/self_contact.py GARMENT MOTION FRAMES
 
 Prints, for the reference without self-contact and with it, each from its own settled start: CPU time of a
-frame, faces that an edge of another triangle passes through (asked of ipctk, not of the project's metric),
-vertices inside the body, and the share of frames that converged.
+frame, faces that an edge of another triangle passes through (asked of ipctk, not of the project's
+metric), vertices inside the body, and the share of frames that converged.
 """
 
 import dataclasses
@@ -47,7 +47,9 @@ def measure(scene, label):
     trajectory = method.run()
     milliseconds = 1e3 * (time.process_time() - begun) / (trajectory.frames - 1)
     cut = [faces_cut(x, faces) for x in trajectory.positions]
-    inside = [np.mean(scene.obstacle.signed_distance(x, t) < 0) for t, x in enumerate(trajectory.positions)]
+    inside = [
+        np.mean(scene.obstacle.signed_distance(x, t) < 0) for t, x in enumerate(trajectory.positions)
+    ]
     print(
         f"{label}: settled in {settling:.0f} s; {trajectory.frames} frames, {milliseconds:.0f} ms a frame; "
         f"faces cut: {np.mean(cut):.2f} in the mean, {max(cut)} at most, of {len(faces)}; "

@@ -18,14 +18,19 @@ from benchmarks.validation.plates import plate_stiffness
 EXACT = np.array(SZE)
 
 
-def measure(rows: int, *, zero: bool, family: str = "equilateral", bend: float = 1.0, stretch: float = 1.0):
+def measure(
+    rows: int, *, zero: bool, family: str = "equilateral", bend: float = 1.0, stretch: float = 1.0
+):
     """Print the lifts: nu = 0 if `zero`, else that of hinges; factors on bending and membrane stiffness."""
     stiffness = bend * D / plate_stiffness(family, "length_area")[0]
     young = stretch * ANNULUS_MATERIAL.young_modulus
     material = replace(ANNULUS_MATERIAL, young_modulus=young, bending_stiffness=stiffness)
     lifts = lifted(rows, bend * D if zero else 0.0, material, family)
     print(
-        f"{family:12} {rows:4} {zero!s:6} {bend:5} {stretch:5}", lifts, 100 * (lifts / EXACT - 1), flush=True
+        f"{family:12} {rows:4} {zero!s:6} {bend:5} {stretch:5}",
+        lifts,
+        100 * (lifts / EXACT - 1),
+        flush=True,
     )
 
 

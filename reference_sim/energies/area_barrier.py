@@ -3,8 +3,8 @@
     q = det(F^T F)                      squared area ratio
     E = -kappa A (q - q0)^2 ln(q / q0)  for q < q0, else 0
 
-The form is IPC's barrier (Li et al. 2020) applied to q. Not part of the paper: a scene declares it, and its
-energy is a column of its own. Above q0 = 0.1 (a third of the area lost in each direction) it is zero.
+The form is IPC's barrier (Li et al. 2020) applied to q. Not part of the paper: a scene declares it, and
+its energy is a column of its own. Above q0 = 0.1 (a third of the area lost in each direction) it is zero.
 """
 
 from __future__ import annotations
@@ -54,9 +54,13 @@ class AreaBarrier(Energy):
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
         gradient = np.zeros_like(x)
-        return _gradient(x, self.stencils, self.Dm_inverse, self.scales, self.threshold, gradient), gradient
+        return _gradient(
+            x, self.stencils, self.Dm_inverse, self.scales, self.threshold, gradient
+        ), gradient
 
-    def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    def active_hessian_blocks(
+        self, x: np.ndarray, convexity: float = 0.0
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return the blocks, see Energy: E'' grad q grad q^T, and E' Hess q reduced by `convexity`."""
         return _hessian(x, self.stencils, self.Dm_inverse, self.scales, self.threshold, convexity)
 

@@ -5,8 +5,8 @@
 
 with the edge e = x1 - x0 and the face normals n1 = e x (x2 - x0), n2 = (x3 - x0) x e. By default
 s = l^2 / (4 (A1 + A2)) of the rest state, as in the code of SNUG's authors (losses/physics.py), to which
-their k belongs; l is the present length there. scaling="none" is s = 1, as the paper prints it (eq. 11): some
-three times as stiff.
+their k belongs; l is the present length there. scaling="none" is s = 1, as the paper prints it (eq. 11):
+some three times as stiff.
 """
 
 from __future__ import annotations
@@ -157,7 +157,10 @@ def _gradient(x, hinges, stiffness, rest, gradient):
             u[12 * L + n] = 0.5 * s * theta
             # d theta / d x_a = w_a n/|n|^2 of each face, w as in _hessian.
             a, b = s / (ax * ax + ay * ay + az * az), s / (bx * bx + by * by + bz * bz)
-            foot_a, foot_b = (ex * rx + ey * ry + ez * rz) / length, (ex * sx + ey * sy + ez * sz) / length
+            foot_a, foot_b = (
+                (ex * rx + ey * ry + ez * rz) / length,
+                (ex * sx + ey * sy + ez * sz) / length,
+            )
             a0, b0, a1, b1 = (length - foot_a) * a, (length - foot_b) * b, foot_a * a, foot_b * b
             a2, b2 = -length * a, -length * b
             u[n], u[L + n], u[2 * L + n] = a0 * ax + b0 * bx, a0 * ay + b0 * by, a0 * az + b0 * bz
@@ -177,9 +180,9 @@ def _gradient(x, hinges, stiffness, rest, gradient):
 def _hessian(x, hinges, stiffness, rest, convexity, slots, base, stride, data):
     """Add k [grad theta grad theta^T + (1 - convexity) (theta - theta_0) Hess theta] to data.
 
-    With the edge's length L and direction e, the foot t of a face's tip, m = n/|n|^2, p = m x e, the weights
-    w = (L - t, t, -L) and signs r = (-1, 1, 0) of the edge's ends and the tip, and c = |n|^2 / (2 L^2), the
-    face's part of block a, b of Hess theta is +- m y^T + z m^T with
+    With the edge's length L and direction e, the foot t of a face's tip, m = n/|n|^2, p = m x e, the
+    weights w = (L - t, t, -L) and signs r = (-1, 1, 0) of the edge's ends and the tip, and c = |n|^2 / (2
+    L^2), the face's part of block a, b of Hess theta is +- m y^T + z m^T with
 
         y = (w_a w_b + r_a r_b c) p - r_a w_b e / L,   z = (w_a w_b + r_a r_b c) p - r_b w_a e / L
 

@@ -65,8 +65,8 @@ def arctan2(y: np.float32, x: np.float32) -> np.float32:
     return -a if y < np.float32(0.0) else a
 
 
-# The corners of an element are copied into one small array of known size and the result copied back: within
-# it the compiler knows that nothing overlaps, which for rows chosen by index it could not know.
+# The corners of an element are copied into one small array of known size and the result copied back:
+# within it the compiler knows that nothing overlaps, which for rows chosen by index it could not know.
 @njit(cache=True, fastmath=GUARDED, error_model="numpy")
 def _bending(x, hinges, stiffness, rest, values, gradients):
     """Set values [J] and add to gradients [N]; d theta / d x_a = +- w_a n / |n|^2, as in definition."""
@@ -127,8 +127,8 @@ def lanes(term: BendHinge) -> Float32Lanes:
 def hinge_gradient(data, u, gradient, s):
     """Return the energy [J] of the hinges and add to gradient (3V,) [N].
 
-    With L for LANES_FLOAT32: vertices (B, 4 L): 3 times the vertex. constants (B, 2 L): stiffness [J], rest
-    angle [rad]. edges (B, 9 L): of x_0.
+    With L for LANES_FLOAT32: vertices (B, 4 L): 3 times the vertex. constants (B, 2 L): stiffness [J],
+    rest angle [rad]. edges (B, 9 L): of x_0.
     """
     vertices, constants, edges = data
     total = 0.0
@@ -143,8 +143,16 @@ def hinge_gradient(data, u, gradient, s):
         energy = np.float32(0.0)
         for g in range(L):
             ex, ey, ez = s[g] + e[g], s[L + g] + e[L + g], s[2 * L + g] + e[2 * L + g]
-            px, py, pz = s[3 * L + g] + e[3 * L + g], s[4 * L + g] + e[4 * L + g], s[5 * L + g] + e[5 * L + g]
-            qx, qy, qz = s[6 * L + g] + e[6 * L + g], s[7 * L + g] + e[7 * L + g], s[8 * L + g] + e[8 * L + g]
+            px, py, pz = (
+                s[3 * L + g] + e[3 * L + g],
+                s[4 * L + g] + e[4 * L + g],
+                s[5 * L + g] + e[5 * L + g],
+            )
+            qx, qy, qz = (
+                s[6 * L + g] + e[6 * L + g],
+                s[7 * L + g] + e[7 * L + g],
+                s[8 * L + g] + e[8 * L + g],
+            )
             length2 = ex * ex + ey * ey + ez * ez + TINY
             inverse = ONE / np.sqrt(length2)
             length = length2 * inverse
@@ -157,7 +165,9 @@ def hinge_gradient(data, u, gradient, s):
             bx, by, bz = nx * scale, ny * scale, nz * scale
             foot_a = (ex * px + ey * py + ez * pz) * inverse
             foot_b = (ex * qx + ey * qy + ez * qz) * inverse
-            sine = inverse * ((by * az - bz * ay) * ex + (bz * ax - bx * az) * ey + (bx * ay - by * ax) * ez)
+            sine = inverse * (
+                (by * az - bz * ay) * ex + (bz * ax - bx * az) * ey + (bx * ay - by * ax) * ez
+            )
             cosine = -(ax * bx + ay * by + az * bz)
             angle = arctan2(sine, cosine) - c[L + g]
             angle -= TWO_PI * np.floor((angle + PI) / TWO_PI)
@@ -206,7 +216,8 @@ def _arrays(term: BendHinge) -> tuple:
 def fold(x, hinge, rest, gradient):
     """Return theta - rest of one hinge, wrapped into half a turn; its gradient (4, 3) [1/m] is written.
 
-    A face of a hinge turns by one radian where its tip moves by its height over the edge, along the normal.
+    A face of a hinge turns by one radian where its tip moves by its height over the edge, along the
+    normal.
     """
     p, q = hinge[0], hinge[1]
     e0, e1, e2 = x[q, 0] - x[p, 0], x[q, 1] - x[p, 1], x[q, 2] - x[p, 2]

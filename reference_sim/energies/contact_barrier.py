@@ -2,19 +2,20 @@
 
     E = kappa dhat sum_k w_k m_k b(d_k^2 / dhat^2),   b(s) = -(s - 1)^2 ln s  for s < 1, else 0
 
-over the pairs k of a vertex and a face, or of two edges, that are closer than dhat; d_k is their distance.
-w_k [m^2] is a quarter of the rest area of the vertex, or of those of both edges; m_k fades out edges that are
-nearly parallel. kappa [Pa] is a pressure: a pair pushes with -2 kappa w_k m_k b'(s) d_k / dhat, which at
-half the distance dhat is 4.3 kappa w_k.
+over the pairs k of a vertex and a face, or of two edges, that are closer than dhat; d_k is their
+distance. w_k [m^2] is a quarter of the rest area of the vertex, or of those of both edges; m_k fades out
+edges that are nearly parallel. kappa [Pa] is a pressure: a pair pushes with -2 kappa w_k m_k b'(s) d_k /
+dhat, which at half the distance dhat is 4.3 kappa w_k.
 
-Distances, pairs, their derivatives and collision detection are those of the package ipctk (IPC Toolkit, MIT
-licence), which *is* the definition: there is none in torch. Networks are trained with ContactPenalty.
+Distances, pairs, their derivatives and collision detection are those of the package ipctk (IPC Toolkit,
+MIT licence), which *is* the definition: there is none in torch. Networks are trained with ContactPenalty.
 
 Beyond a touch the energy means nothing: a distance has no sign. Hence `largest_step` bounds every line
 search by continuous collision detection, and a step starts without an intersection: by `ccd_fraction` the
 simulator moves the cloth from the start of the step as far as nothing meets, minimises there to gain
-distance, and goes on. Contact with a body is another term's: where the body leaves less room than the cloth
-needs, as between arm and chest, that term gives way: cloth goes into the body and never through itself.
+distance, and goes on. Contact with a body is another term's: where the body leaves less room than the
+cloth needs, as between arm and chest, that term gives way: cloth goes into the body and never through
+itself.
 """
 
 from __future__ import annotations
@@ -152,7 +153,9 @@ class ContactBarrier(Energy):
         for pair in search.detect_edge_face_candidates():
             edge, face = mesh.edges[pair.edge_id], mesh.faces[pair.face_id]
             if ipctk.is_edge_intersecting_triangle(*positions[edge], *positions[face]):
-                return f"edge ({min(edge)}, {max(edge)}) of the cloth cuts face {pair.face_id} of the cloth"
+                return (
+                    f"edge ({min(edge)}, {max(edge)}) of the cloth cuts face {pair.face_id} of the cloth"
+                )
         return "an edge cuts a face"
 
     def _candidates(self, a: np.ndarray, b: np.ndarray) -> Any:

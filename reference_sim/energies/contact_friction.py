@@ -1,16 +1,16 @@
 """Coulomb friction of contact samples on a moving body, smoothed and lagged so that it is an energy.
 
-    u = (I - n n^T) ((x_s - x_s^t) - (c - c^t))    slip over the step, relative to the skin under the sample
-    E = mu N f(|u|),   f(y) = y^2/h - y^3/(3 h^2) + h/3 for y < h, else y,   h = speed dt
+    u = (I - n n^T) ((x_s - x_s^t) - (c - c^t))    slip over the step, relative to the skin under the
+    sample E = mu N f(|u|),   f(y) = y^2/h - y^3/(3 h^2) + h/3 for y < h, else y,   h = speed dt
 
 (IPC's smoothing, Li et al. 2020.) `speed` [m/s] is the slip below which friction is still growing.
 
-N [N] is the normal force of the collision penalty that ended the previous step, on that step's planes: the
-force that acted, so that friction is mu times what carried the cloth, also where the cloth slides past the
-end of a plane within a step. It comes a step late: a sample that meets the skin within a step has friction
-from the next one on. A first step (frame 1, or 0 of a potential without frames) has none before it: there N
-is that of the start, on the step's own planes moved back with the skin. In any other step without the one
-before, N is not known, and the energy is refused.
+N [N] is the normal force of the collision penalty that ended the previous step, on that step's planes:
+the force that acted, so that friction is mu times what carried the cloth, also where the cloth slides
+past the end of a plane within a step. It comes a step late: a sample that meets the skin within a step
+has friction from the next one on. A first step (frame 1, or 0 of a potential without frames) has none
+before it: there N is that of the start, on the step's own planes moved back with the skin. In any other
+step without the one before, N is not known, and the energy is refused.
 """
 
 from __future__ import annotations
@@ -110,7 +110,9 @@ class ContactFriction(Energy):
         state = (self._known_forces(), self.anchors, self.normals, self.threshold)
         return _gradient(x, self.stencils, self.weights, *state, gradient), gradient
 
-    def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    def active_hessian_blocks(
+        self, x: np.ndarray, convexity: float = 0.0
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return the samples (n,) with second derivatives, and these (n, 9, 9) [N/m]; see Energy."""
         forces = self._known_forces()
         elements = np.flatnonzero(forces)

@@ -4,12 +4,13 @@
     E = k a_s max(eps - d, 0)^3         k [J/m^5], a_s [m^2]
 
 The exact distance to a moving body has jumps where a sample is pinched between two limbs, and Newton's
-method does not survive them; so each sample gets one plane per step, taken at the initial guess and frozen
-(`Obstacle.planes`), and this energy is the distance to that plane. The true signed distance is a metric.
+method does not survive them; so each sample gets one plane per step, taken at the initial guess and
+frozen (`Obstacle.planes`), and this energy is the distance to that plane. The true signed distance is a
+metric.
 
-Samples sit on vertices, edge midpoints and face centroids, because a coarse mesh whose vertices are outside
-still cuts through a shoulder with its edges. a_s makes k a density: each of the three kinds of sample
-carries the whole area of the cloth once, so that a finer mesh does not get a stiffer contact.
+Samples sit on vertices, edge midpoints and face centroids, because a coarse mesh whose vertices are
+outside still cuts through a shoulder with its edges. a_s makes k a density: each of the three kinds of
+sample carries the whole area of the cloth once, so that a finer mesh does not get a stiffer contact.
 """
 
 from __future__ import annotations
@@ -85,10 +86,10 @@ def _longest(u):
 def contact_gradient(data, u, gradient, s):
     """Return the energy [J] of the contact penalty and add to gradient (3V,) [N].
 
-    deepest (B,): largest depth of a block at x_0 [m]. With L for LANES_FLOAT32: vertices (B, 3 L): 3 times
-    the vertex. constants (B, 4 L): weights, stiffness [J/m^3]. planes (B, 4 L): normal, and the depth of x_0
-    under the margin [m], below zero above it. No sample moves farther than the vertex that moves most, so a
-    block that is higher than that is not visited.
+    deepest (B,): largest depth of a block at x_0 [m]. With L for LANES_FLOAT32: vertices (B, 3 L): 3
+    times the vertex. constants (B, 4 L): weights, stiffness [J/m^3]. planes (B, 4 L): normal, and the
+    depth of x_0 under the margin [m], below zero above it. No sample moves farther than the vertex that
+    moves most, so a block that is higher than that is not visited.
     """
     deepest_at_start, vertices, constants, planes = data
     total, height = 0.0, -_longest(u)
@@ -152,7 +153,9 @@ def sample_depth(x, stencil, weight, margin, c, n):
     """Return max(eps - n.(x_s - c), 0) of one contact sample [m]."""
     distance = 0.0
     for i in range(3):
-        sample = weight[0] * x[stencil[0], i] + weight[1] * x[stencil[1], i] + weight[2] * x[stencil[2], i]
+        sample = (
+            weight[0] * x[stencil[0], i] + weight[1] * x[stencil[1], i] + weight[2] * x[stencil[2], i]
+        )
         distance += n[i] * (sample - c[i])
     return max(margin - distance, 0.0)
 
@@ -205,7 +208,9 @@ def _solve(data, x, w):
             force[e] += change
             for c in range(3):
                 for i in range(3):
-                    x[stencils[e, c], i] += w[stencils[e, c]] * slope * shares[e, c] * normals[e, i] * change
+                    x[stencils[e, c], i] += (
+                        w[stencils[e, c]] * slope * shares[e, c] * normals[e, i] * change
+                    )
     return 0.0
 
 
@@ -259,7 +264,8 @@ class ContactPenalty(Energy):
         self.rest_samples = self.sample_matrix @ cloth.rest_positions
         self.planes: Planes | None = None
         self.step: Step | None = None  # that the planes belong to
-        # Until a step is prepared every plane lies far below its sample: no contact. Finite also as float32.
+        # Until a step is prepared every plane lies far below its sample: no contact. Finite also as
+        # float32.
         self.points = np.tile([0.0, -1e30, 0.0], (len(self.stencils), 1))
         self.normals = np.tile([0.0, 1.0, 0.0], (len(self.stencils), 1))
 
@@ -319,7 +325,13 @@ class ContactPenalty(Energy):
     def add_hessian(self, x: np.ndarray, convexity: float, places: BlockPlaces, data: np.ndarray) -> None:
         """Add the second derivatives at x (V, 3) [m] to the values `data` of a matrix."""
         _add_hessian(
-            *self._curvatures(x), self.weights, self.normals, places.slots, places.base, places.stride, data
+            *self._curvatures(x),
+            self.weights,
+            self.normals,
+            places.slots,
+            places.base,
+            places.stride,
+            data,
         )
 
     def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -349,7 +361,10 @@ def _samples(cloth: Cloth, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarra
         edges, faces = cloth.edges, cloth.faces
         stencils += [edges[:, [0, 1, 1]], faces]
         weights += [np.tile([0.5, 0.5, 0.0], (len(edges), 1)), np.full((len(faces), 3), 1 / 3)]
-        areas += [np.bincount(cloth.sides.ravel(), np.repeat(cloth.areas / 3, 3), len(edges)), cloth.areas]
+        areas += [
+            np.bincount(cloth.sides.ravel(), np.repeat(cloth.areas / 3, 3), len(edges)),
+            cloth.areas,
+        ]
     return np.concatenate(stencils), np.concatenate(weights), np.concatenate(areas)
 
 

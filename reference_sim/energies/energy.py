@@ -52,14 +52,14 @@ class Energy:
     """One physical term on one stencil.
 
     Attributes:
-        dynamic: True where the vertices that the term couples change with x, as the pairs of a contact do.
-            Such a term has no stencils (N = 0); it gives `sparse_hessian` instead of blocks.
-        constant: block sizes (3: Hessian, 1: scalar stiffness) of which the term gives the same at every x
-            and in every step.
-        remembers: whether `prepare` reads what the step before has left. Where no term does, a step can be
-            judged without preparing the one before it.
-        joins_late: whether a step is minimised without the term first, and goes on with it by a way without
-            a collision. It is zero wherever nothing is near, so most steps end without it.
+        dynamic: True where the vertices that the term couples change with x, as the pairs of a contact
+            do. Such a term has no stencils (N = 0); it gives `sparse_hessian` instead of blocks.
+        constant: block sizes (3: Hessian, 1: scalar stiffness) of which the term gives the same at every
+            x and in every step.
+        remembers: whether `prepare` reads what the step before has left. Where no term does, a step can
+            be judged without preparing the one before it.
+        joins_late: whether a step is minimised without the term first, and goes on with it by a way
+            without a collision. It is zero wherever nothing is near, so most steps end without it.
         kernels: functions by use, see kernels.fast_kernels. A subclass does not inherit them.
     """
 
@@ -141,7 +141,9 @@ class Energy:
         zero = torch.zeros_like(u)
         return torch.stack([(zero if r is None else r).flatten(-2) for r in rows], dim=1).numpy()
 
-    def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    def active_hessian_blocks(
+        self, x: np.ndarray, convexity: float = 0.0
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return elements (n,) with a Hessian at x (V, 3) [m] and their blocks (n, 3k, 3k) [N/m].
 
         convexity: share of the negative curvature that is taken out: 0 gives the true second derivatives,
@@ -185,8 +187,8 @@ class Energy:
     def predict_stress(self, x: np.ndarray, step: np.ndarray) -> None:
         """Let the Hessian take, until `forget`, the stresses that linear strain predicts at x + step (V, 3).
 
-        Energy and gradient know nothing of it. For stiff terms whose Hessian holds stress: computed from the
-        strain after a long step, it would be false by orders of magnitude.
+        Energy and gradient know nothing of it. For stiff terms whose Hessian holds stress: computed from
+        the strain after a long step, it would be false by orders of magnitude.
         """
 
     def forget(self) -> None:

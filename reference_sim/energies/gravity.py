@@ -35,7 +35,9 @@ class Gravity(Energy):
     constant = (3,)
     kernels: ClassVar = {"vertex_weights": lambda term: term.weights, "training_batch": batch}
 
-    def __init__(self, cloth: Cloth, origin_height: float = 0.0, *, acceleration: float = GRAVITY) -> None:
+    def __init__(
+        self, cloth: Cloth, origin_height: float = 0.0, *, acceleration: float = GRAVITY
+    ) -> None:
         self.cloth = cloth
         self.stencils = np.arange(cloth.vertex_count)[:, None]
         self.weights = cloth.masses * acceleration
@@ -61,6 +63,8 @@ class Gravity(Energy):
         gradient[:, 1] = self.weights
         return float(self.weights @ (x[:, 1] - self.origin_height)), gradient
 
-    def active_hessian_blocks(self, x: np.ndarray, convexity: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    def active_hessian_blocks(
+        self, x: np.ndarray, convexity: float = 0.0
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Return no blocks: the energy is linear."""
         return np.arange(0), np.zeros((0, 3, 3))

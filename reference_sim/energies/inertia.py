@@ -70,9 +70,9 @@ class Inertia(Energy):
 def batch_of_windows(term: Inertia, ahead: np.ndarray, windows: int, weight: float = 1.0) -> BatchKernel:
     """Return the kernel of training on a CPU, of windows that fill whole blocks.
 
-    E = weight m / (2 dt^2) |a|^2 with a = x_t - 2 x_{t-1} + x_{t-2} - ahead_t, zero for the first two frames.
-    ahead (C, 3, TRAINING_LANES) [m]: where the frame before would be if nothing pulled, seen from where it
-    is.
+    E = weight m / (2 dt^2) |a|^2 with a = x_t - 2 x_{t-1} + x_{t-2} - ahead_t, zero for the first two
+    frames. ahead (C, 3, TRAINING_LANES) [m]: where the frame before would be if nothing pulled, seen from
+    where it is.
     """
     stiffness = (weight * term.masses / term.dt**2).astype(np.float32)[:, None, None]
     one = windows // TRAINING_LANES  # blocks a frame

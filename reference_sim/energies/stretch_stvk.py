@@ -111,8 +111,8 @@ class StretchStVK(Energy):
     def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return (mu + lambda/2) times the cotangent Laplacian.
 
-        At rest the Hessian's mean over directions is (lambda + 3 mu)/2 of it in the plane of the cloth and
-        lambda/3 + mu of it in space; this lies between the two.
+        At rest the Hessian's mean over directions is (lambda + 3 mu)/2 of it in the plane of the cloth
+        and lambda/3 + mu of it in space; this lies between the two.
         """
         b = np.concatenate([-self.Dm_inverse.sum(axis=1, keepdims=True), self.Dm_inverse], axis=1)
         scale = (self.mu + 0.5 * self.lam) * self.areas
@@ -204,7 +204,11 @@ def _linear_stress(x, step, faces, Dm_inverse, lam, mu, stress):
             G11 += fb[i] * db[i]
             G01 += 0.5 * (fa[i] * db[i] + fb[i] * da[i])
         trace = lam * (G00 + G11)
-        stress[f, 0], stress[f, 1], stress[f, 2] = trace + 2 * mu * G00, trace + 2 * mu * G11, 2 * mu * G01
+        stress[f, 0], stress[f, 1], stress[f, 2] = (
+            trace + 2 * mu * G00,
+            trace + 2 * mu * G11,
+            2 * mu * G01,
+        )
 
 
 @njit(cache=True, error_model="numpy")

@@ -52,8 +52,8 @@ def lanes(term: StretchStVK) -> Float32Lanes:
 def membrane_gradient(data, u, gradient, s):
     """Return the energy [J] of StVK and add to gradient (3V,) [N].
 
-    With L for LANES_FLOAT32: vertices (B, 3 L): 3 times the vertex. constants (B, 5 L): Dm^-1 by rows, rest
-    area. edges (B, 6 L): of x_0.
+    With L for LANES_FLOAT32: vertices (B, 3 L): 3 times the vertex. constants (B, 5 L): Dm^-1 by rows,
+    rest area. edges (B, 6 L): of x_0.
     """
     vertices, constants, edges, lam, mu = data
     total = 0.0
@@ -70,7 +70,11 @@ def membrane_gradient(data, u, gradient, s):
         energy = np.float32(0.0)
         for g in range(L):
             x1, y1, z1 = s[g] + e[g], s[L + g] + e[L + g], s[2 * L + g] + e[2 * L + g]
-            x2, y2, z2 = s[3 * L + g] + e[3 * L + g], s[4 * L + g] + e[4 * L + g], s[5 * L + g] + e[5 * L + g]
+            x2, y2, z2 = (
+                s[3 * L + g] + e[3 * L + g],
+                s[4 * L + g] + e[4 * L + g],
+                s[5 * L + g] + e[5 * L + g],
+            )
             d00, d01, d10, d11 = c[g], c[L + g], c[2 * L + g], c[3 * L + g]
             area = c[4 * L + g]
             ax, ay, az = x1 * d00 + x2 * d10, y1 * d00 + y2 * d10, z1 * d00 + z2 * d10
@@ -104,11 +108,13 @@ def batch(term: StretchStVK) -> BatchKernel:
     """Bind the kernel to the faces of the term."""
     Dm_inverse = term.Dm_inverse.reshape(-1, 4).astype(np.float32)
     areas = term.areas.astype(np.float32)
-    return batch_kernel(_strain, term.stencils, Dm_inverse, areas, np.float32(term.lam), np.float32(term.mu))
+    return batch_kernel(
+        _strain, term.stencils, Dm_inverse, areas, np.float32(term.lam), np.float32(term.mu)
+    )
 
 
-# The corners of an element are copied into one small array of known size and the result copied back: within
-# it the compiler knows that nothing overlaps, which for rows chosen by index it could not know.
+# The corners of an element are copied into one small array of known size and the result copied back:
+# within it the compiler knows that nothing overlaps, which for rows chosen by index it could not know.
 @njit(cache=True, fastmath=GUARDED, error_model="numpy")
 def _strain(x, faces, Dm_inverse, areas, lam, mu, values, gradients):
     """Set values [J] and add dE/dx_a = A F S b_a to gradients [N], as in definition."""
@@ -135,7 +141,11 @@ def _strain(x, faces, Dm_inverse, areas, lam, mu, values, gradients):
                 square = G00 * G00 + G11 * G11 + G01 * G01 + G01 * G01
                 energy[n] = area * (HALF * lam * trace * trace + mu * square)
                 m = mu + mu
-                S00, S11, S01 = area * (lam * trace + m * G00), area * (lam * trace + m * G11), area * m * G01
+                S00, S11, S01 = (
+                    area * (lam * trace + m * G00),
+                    area * (lam * trace + m * G11),
+                    area * m * G01,
+                )
                 # Columns of P = A F S, then the forces on the second and third corner.
                 ux, uy, uz = px * S00 + qx * S01, py * S00 + qy * S01, pz * S00 + qz * S01
                 vx, vy, vz = px * S01 + qx * S11, py * S01 + qy * S11, pz * S01 + qz * S11

@@ -1,8 +1,8 @@
 """Arrays from files that anyone may have written; nothing that such a file names is run.
 
-A pickle is a program: it names functions and calls them. Here a name can only stand for plain values, arrays
-of numpy and what SMPL's files hold besides: arrays of chumpy are taken as the array that they hold,
-compressed sparse columns of scipy as a dense array.
+A pickle is a program: it names functions and calls them. Here a name can only stand for plain values,
+arrays of numpy and what SMPL's files hold besides: arrays of chumpy are taken as the array that they
+hold, compressed sparse columns of scipy as a dense array.
 """
 
 from __future__ import annotations

@@ -1,10 +1,11 @@
 """Mesh files of other programs: one mesh or a sequence, in metres with y up, and the pattern in a UV chart.
 
-OBJ is read here, since meshio refuses the texture coordinates of a garment with seams; PLY, STL and OFF are
-read by meshio.
+OBJ is read here, since meshio refuses the texture coordinates of a garment with seams; PLY, STL and OFF
+are read by meshio.
 
-Along a seam a vertex has one place in each piece of the pattern, so a chart is kept by the faces' corners. In
-space the pieces are one mesh: vertices that a program has doubled for the sake of its chart are joined.
+Along a seam a vertex has one place in each piece of the pattern, so a chart is kept by the faces'
+corners. In space the pieces are one mesh: vertices that a program has doubled for the sake of its chart
+are joined.
 """
 
 from __future__ import annotations
@@ -30,7 +31,8 @@ METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 UP_AXES = ("y", "z")
 LARGEST_COORDINATE = 1e12  # in any unit: squares and cubes of it are still numbers
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))  # of a vertex, as programs call them
-# Points, polygons, texture coordinates, and places in these parallel to polygons, -1 for a corner without.
+# Points, polygons, texture coordinates, and places in these parallel to polygons, -1 for a corner
+# without.
 Contents = tuple[Any, Sequence[Any], Any, Sequence[Any]]
 
 
@@ -49,8 +51,8 @@ class Surface:
 def read_mesh(path: str | Path) -> Surface:
     """Read the triangles and quads of one mesh file.
 
-    Raises MeshError that names the file: missing, unreadable or of unknown format, without faces, with five
-    corners at a face, or a vertex that is not finite.
+    Raises MeshError that names the file: missing, unreadable or of unknown format, without faces, with
+    five corners at a face, or a vertex that is not finite.
     """
     path = Path(path)
     if not path.is_file():
@@ -79,7 +81,9 @@ def _read_obj(path: Path) -> Contents:
                     polygons.append([_counted(c[0], len(points)) for c in corners])
                     uv_polygons.append([_counted(c[1], len(uv)) if c[1] else -1 for c in corners])
             except (ValueError, IndexError):
-                raise MeshError(f"{path}: line {number} is not understood: {line.strip()[:60]!r}") from None
+                raise MeshError(
+                    f"{path}: line {number} is not understood: {line.strip()[:60]!r}"
+                ) from None
     return points, polygons, uv, uv_polygons
 
 
@@ -154,17 +158,20 @@ def _triangles(path: Path, polygons: Sequence[Any], known: range, what: str) -> 
 def read_sequence(pattern: str | Path) -> tuple[np.ndarray, Surface]:
     """Read a moving mesh: positions (T, B, 3) and, for its faces, the first mesh.
 
-    pattern: one mesh (T = 1), a folder of meshes of one kind, or a glob such as "body_*.obj", taken in the
-    order of the numbers in their names.
+    pattern: one mesh (T = 1), a folder of meshes of one kind, or a glob such as "body_*.obj", taken in
+    the order of the numbers in their names.
 
-    Raises MeshError as `read_mesh`, for no files, and for vertices or faces other than those of the first.
+    Raises MeshError as `read_mesh`, for no files, and for vertices or faces other than those of the
+    first.
     """
     paths = _paths(str(pattern))
     first = read_mesh(paths[0])
     frames = [first.positions]
     for path in paths[1:]:
         surface = read_mesh(path)
-        if surface.positions.shape != first.positions.shape or not np.array_equal(surface.faces, first.faces):
+        if surface.positions.shape != first.positions.shape or not np.array_equal(
+            surface.faces, first.faces
+        ):
             raise MeshError(
                 f"{path}: other vertices or faces than {paths[0].name}: a sequence needs one numbering: "
                 "export OBJ or PLY without reordering"
@@ -241,8 +248,9 @@ def join_seams(surface: Surface) -> tuple[Surface, np.ndarray]:
 def rest_chart(surface: Surface, scale: float) -> np.ndarray:
     """Return the chart (F, 3, 2) [m] of a surface in metres, as `Cloth` takes it for `rest_uv`.
 
-    scale: metres per unit of the chart. Raises MeshError for a chart that is missing, has no corner or area
-    somewhere, an area further than `AREA_FACTOR` from that of the mesh, or the distortion of no pattern.
+    scale: metres per unit of the chart. Raises MeshError for a chart that is missing, has no corner or
+    area somewhere, an area further than `AREA_FACTOR` from that of the mesh, or the distortion of no
+    pattern.
     """
     instead = "rest=mesh takes the mesh itself as rest shape"
     if surface.uv is None:

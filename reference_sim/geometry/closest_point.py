@@ -1,14 +1,14 @@
 """Closest points of a moving triangle mesh, exactly: lists of leaves, bounds in float32, answers in float64.
 
-In one pose the faces are halved again and again along the longest side of the box of their centroids, down to
-leaves of LANES neighbouring faces; samples likewise to groups, by their places at rest. A sample may be
-restricted to the faces near its own place at rest: which leaves a group may meet is then known for good. A
-search begins with the face that its caller remembers from before: any face is an upper bound, and a good one
-leaves little to look at.
+In one pose the faces are halved again and again along the longest side of the box of their centroids,
+down to leaves of LANES neighbouring faces; samples likewise to groups, by their places at rest. A sample
+may be restricted to the faces near its own place at rest: which leaves a group may meet is then known for
+good. A search begins with the face that its caller remembers from before: any face is an upper bound, and
+a good one leaves little to look at.
 
-An answer depends on mesh and point alone, never on what was remembered: bounds (leaf_bounds) decide what is
-looked at, of faces at the same distance the one of lowest index answers, and a face is left out only if it is
-farther by more than round-off. Distances are in float64 even where the mesh is kept in float32.
+An answer depends on mesh and point alone, never on what was remembered: bounds (leaf_bounds) decide what
+is looked at, of faces at the same distance the one of lowest index answers, and a face is left out only
+if it is farther by more than round-off. Distances are in float64 even where the mesh is kept in float32.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ from reference_sim.kernels.lanes import bits_at_most, lowest_bit
 
 DISTANCE_ROUND_OFF = 1e-14  # of lengths, of distances: some fifty times that of float64
 
-# Samples: in groups order[16 i : 16 i + 16]; group i (the last list serves all beyond it) may meet the leaves
-# of blocks[starts[i] : stops[i]] whose bit is set in masks, and no others; leaves: of all groups. rest (S, 3)
-# [m] in this order and limit [m^2]: the rule of regions.
+# Samples: in groups order[16 i : 16 i + 16]; group i (the last list serves all beyond it) may meet the
+# leaves of blocks[starts[i] : stops[i]] whose bit is set in masks, and no others; leaves: of all groups.
+# rest (S, 3) [m] in this order and limit [m^2]: the rule of regions.
 Listed = namedtuple("Listed", "order starts stops blocks masks leaves rest limit")
 
 
@@ -58,8 +58,8 @@ def list_leaves(low, high, leaf_low, leaf_high, limit, masks):
 def search(points, samples, everywhere, exact, mesh, pose, faces, barycentric, closest):
     """Find the closest face of every sample at points (S, 3).
 
-    faces (S,) come in as hints and go out as answers. everywhere: the list of all leaves, for samples without
-    a face in their region.
+    faces (S,) come in as hints and go out as answers. everywhere: the list of all leaves, for samples
+    without a face in their region.
     """
     missed = np.empty(len(points), np.int64)
     set_boxes(samples.leaves, mesh, pose)
@@ -70,9 +70,21 @@ def search(points, samples, everywhere, exact, mesh, pose, faces, barycentric, c
         set_boxes(everywhere.leaves, mesh, pose)
         fit_leaf(0, mesh, pose)  # whoever asks for NaN gets its first face
         faces[missed[:count]] = mesh.order[0]
-        barycentric[missed[:count]], closest[missed[:count]] = 1.0 / 3.0, mesh.corners[0].sum(axis=0) / 3.0
+        barycentric[missed[:count]], closest[missed[:count]] = (
+            1.0 / 3.0,
+            mesh.corners[0].sum(axis=0) / 3.0,
+        )
         _search_groups(
-            missed[:count].copy(), points, everywhere, exact, mesh, pose, faces, barycentric, closest, missed
+            missed[:count].copy(),
+            points,
+            everywhere,
+            exact,
+            mesh,
+            pose,
+            faces,
+            barycentric,
+            closest,
+            missed,
         )
 
 
@@ -139,7 +151,9 @@ def _search_groups(some, points, samples, exact, mesh, pose, faces, barycentric,
                     if out[LANES * g + lane] > useful[g] or k == answer[g]:
                         continue
                     c0, c1, c2 = centroids[k, 0], centroids[k, 1], centroids[k, 2]
-                    if limited and not _within(c0 - rest[at, 0], c1 - rest[at, 1], c2 - rest[at, 2], limit):
+                    if limited and not _within(
+                        c0 - rest[at, 0], c1 - rest[at, 1], c2 - rest[at, 2], limit
+                    ):
                         continue
                     v, w, squared = closest_on_triangle(corners, k, x[g, 0], x[g, 1], x[g, 2])
                     if squared < best[g] or (
@@ -239,7 +253,8 @@ class FaceSearch:
         place = np.argsort(order)
         leaves = -(-len(order) // LANES)
         order = np.append(order, np.repeat(order[-1], LANES * leaves - len(order)))
-        # Corners by ascending vertex: faces then agree to the bit about a side or a corner that they share.
+        # Corners by ascending vertex: faces then agree to the bit about a side or a corner that they
+        # share.
         ascending = np.argsort(self.faces[order], axis=1, kind="stable")
         vertices = np.take_along_axis(self.faces[order], ascending, axis=1)
         kind, blocks = centroids.dtype, -(-leaves // LANES)
@@ -268,8 +283,8 @@ class FaceSearch:
     def listed(self, points: np.ndarray, region: float = np.inf) -> Listed:
         """Group samples at points (S, 3) [m], best at rest, and list the leaves that each group may meet.
 
-        A sample meets only faces whose rest centroid lies no farther than `region` [m] from its point here;
-        where there is none, all.
+        A sample meets only faces whose rest centroid lies no farther than `region` [m] from its point
+        here; where there is none, all.
         """
         points = np.ascontiguousarray(points, self._mesh.corners.dtype)
         order, whole = halved(points), self._everywhere

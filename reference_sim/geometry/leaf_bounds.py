@@ -1,7 +1,7 @@
 """Distances from samples to faces: bounds for LANES samples and a leaf of faces at once, and the exact one.
 
-Bounds are in float32 and never above the true distance by more than a share of ROUND_OFF, which is added to
-the distance that they are compared with. A leaf is fitted to a pose when it is first needed. The exact
+Bounds are in float32 and never above the true distance by more than a share of ROUND_OFF, which is added
+to the distance that they are compared with. A leaf is fitted to a pose when it is first needed. The exact
 distance is the same to the bit for all triangles that share the side or corner that is closest.
 """
 
@@ -21,12 +21,13 @@ ROUND_OFF = 3e-6  # of lengths, of the bounds: some fifty times that of float32
 FLAT = 1e-12  # squared sine of an angle of a triangle, below which its normal is round-off
 
 # The mesh, faces in the order of L leaves of LANES; the last leaf is filled up with its last face.
-# order (16 L,) and vertices (16 L, 3): face and its vertices, ascending; ascending (16 L, 3): their corners.
-# spread (L, n): the vertices of a leaf, each once, the first repeated. place (F,): of a face in this order.
-# centroids (16 L, 3) [m] at rest. What follows belongs to a pose, each leaf set when it is first needed:
-# boxes (L / 16, 6, 16) [m] of leaves, boxed and fitted (L,) the pose that a leaf's box and the rest were set
-# for; corners (16 L, 3, 3) [m], slabs (L, 5): mean normal, least and greatest height along it [m]; lanes (L,
-# QUANTITIES 16). Boxes, slabs and lanes: from an origin, in float32. offsets (9, 16): room for `fit_leaf`.
+# order (16 L,) and vertices (16 L, 3): face and its vertices, ascending; ascending (16 L, 3): their
+# corners. spread (L, n): the vertices of a leaf, each once, the first repeated. place (F,): of a face in
+# this order. centroids (16 L, 3) [m] at rest. What follows belongs to a pose, each leaf set when it is
+# first needed: boxes (L / 16, 6, 16) [m] of leaves, boxed and fitted (L,) the pose that a leaf's box and
+# the rest were set for; corners (16 L, 3, 3) [m], slabs (L, 5): mean normal, least and greatest height
+# along it [m]; lanes (L, QUANTITIES 16). Boxes, slabs and lanes: from an origin, in float32. offsets (9,
+# 16): room for `fit_leaf`.
 Mesh = namedtuple(
     "Mesh",
     "order vertices spread ascending place centroids boxes boxed fitted corners offsets slabs lanes size",
@@ -38,7 +39,13 @@ Pose = namedtuple("Pose", "number positions origin")
 @njit(cache=True, error_model="numpy")
 def set_boxes(leaves, mesh, pose):
     """Set the boxes of some leaves in a pose, and the greatest distance from the origin along an axis."""
-    spread, boxes, boxed, positions, origin = mesh.spread, mesh.boxes, mesh.boxed, pose.positions, pose.origin
+    spread, boxes, boxed, positions, origin = (
+        mesh.spread,
+        mesh.boxes,
+        mesh.boxed,
+        pose.positions,
+        pose.origin,
+    )
     largest = mesh.size[0]
     for leaf in leaves:
         if boxed[leaf] == pose.number:
@@ -137,8 +144,8 @@ def _set_slab(offsets, slab):
 def leaf_bounds(leaf, boxes, slabs, lanes, x32, useful, count, apart, hits, out):
     """Write into out (LANES LANES,) the bounds of the faces of a leaf, for members that may need one.
 
-    Box and slab of the leaf keep most away. Returns of how many members some faces are within what is of use,
-    and writes into hits (LANES,) LANES times the bits of these faces, plus the member.
+    Box and slab of the leaf keep most away. Returns of how many members some faces are within what is of
+    use, and writes into hits (LANES,) LANES times the bits of these faces, plus the member.
     """
     b, lane = leaf // LANES, leaf % LANES
     l0, l1, l2 = boxes[b, 0, lane], boxes[b, 1, lane], boxes[b, 2, lane]
@@ -167,8 +174,8 @@ def leaf_bounds(leaf, boxes, slabs, lanes, x32, useful, count, apart, hits, out)
 def _face_bounds(leaf, lanes, x, y, z, g, out):
     """Write the squared distances from a sample to the faces of a leaf into row g of out.
 
-    In the frame of each face: its height, and in its plane the distance to the nearest side, where the foot
-    is beyond one. Both change no faster than the sample moves, so that round-off stays round-off.
+    In the frame of each face: its height, and in its plane the distance to the nearest side, where the
+    foot is beyond one. Both change no faster than the sample moves, so that round-off stays round-off.
     """
     zero = np.float32(0.0)
     for i in range(LANES):
@@ -249,8 +256,9 @@ def _closest(a0, a1, a2, b0, b1, b2, c0, c1, c2, x, y, z):
 def closest_on_triangle(corners, place, x, y, z):
     """Return the last two weights of the point of corners[place] closest to (x, y, z), and distance^2.
 
-    It is the foot of the perpendicular, where that lies inside; else the best of the sides that the foot is
-    beyond, one of which holds the closest point. Of a sliver, whose foot is too inexact to tell, all sides.
+    It is the foot of the perpendicular, where that lies inside; else the best of the sides that the foot
+    is beyond, one of which holds the closest point. Of a sliver, whose foot is too inexact to tell, all
+    sides.
     """
     # As numbers: a function with several ends counts the references to an array at every call.
     return _closest(

@@ -9,7 +9,9 @@ from reference_sim.kernels.kernel_cache import njit
 ON_SIDE = 1e-6  # weight of a corner below which a place is on a side; weights may be rounded to float32
 # [m] diameter, of a limb: what the surface is taken for beside the faces that a sample may meet.
 TANGENT_BALL = 0.1
-BEYOND = 1e-3  # cosine to a face, of an offset that leads over it: above the round-off of a foot on a side
+BEYOND = (
+    1e-3  # cosine to a face, of an offset that leads over it: above the round-off of a foot on a side
+)
 
 
 @njit(cache=True, error_model="numpy")
@@ -30,7 +32,9 @@ def vertex_normals(positions, faces):
             for c in range(3):
                 normals[faces[f, a], c] += n[c]
     for v in range(len(normals)):
-        normals[v, 0], normals[v, 1], normals[v, 2], _ = _unit(normals[v, 0], normals[v, 1], normals[v, 2])
+        normals[v, 0], normals[v, 1], normals[v, 2], _ = _unit(
+            normals[v, 0], normals[v, 1], normals[v, 2]
+        )
     return normals
 
 
@@ -44,7 +48,8 @@ def faces_around(faces: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]
 def normals_of_corners(some, positions, faces, starts, around):
     """Return the `vertex_normals` (B, 3) of the corners of some faces (n,); all others stay unset.
 
-    starts, around: see `faces_around`. Cloth meets a part of a body; to sum up all of it would take longer.
+    starts, around: see `faces_around`. Cloth meets a part of a body; to sum up all of it would take
+    longer.
     """
     normals, known = np.empty_like(positions), np.zeros(len(positions), np.bool_)
     for s in some:
@@ -97,11 +102,11 @@ def _beyond(offset, c, face, weights, vertices, faces, starts, around):
 def plane_normals(points, closest, closest_faces, barycentric, vertices, faces, starts, around, normals):
     """Write the normals (S, 3) from the closest points to the samples, turned outwards.
 
-    A sample that looks along the surface, or is below it and beyond the border of the faces that it may meet
-    (another face at the closest point c leads nearer), meets a ball that touches the surface in c from below:
-    the normal points to the sample from the ball's point opposite to c. By Thales' theorem n.(x - c) is
-    negative in that ball alone; where the sample is much nearer than the ball is wide, the plane is the
-    tangent. starts, around: see `faces_around`.
+    A sample that looks along the surface, or is below it and beyond the border of the faces that it may
+    meet (another face at the closest point c leads nearer), meets a ball that touches the surface in c
+    from below: the normal points to the sample from the ball's point opposite to c. By Thales' theorem
+    n.(x - c) is negative in that ball alone; where the sample is much nearer than the ball is wide, the
+    plane is the tangent. starts, around: see `faces_around`.
     """
     of_vertices = normals_of_corners(closest_faces, vertices, faces, starts, around)
     for s in range(len(points)):
@@ -119,7 +124,9 @@ def plane_normals(points, closest, closest_faces, barycentric, vertices, faces, 
         beside = not (length > 1e-6 and np.abs(cosine) > 0.3)
         if cosine < -0.3 and min(u, v, w) <= ON_SIDE:
             face = faces[closest_faces[s]]
-            beside |= _beyond((x, y, z), closest[s], face, barycentric[s], vertices, faces, starts, around)
+            beside |= _beyond(
+                (x, y, z), closest[s], face, barycentric[s], vertices, faces, starts, around
+            )
         if beside:
             ball, outwards = max(TANGENT_BALL, 1.5 * length), 1.0  # below c is in it, however deep
             x, y, z, _ = _unit(ball * m0 + length * x, ball * m1 + length * y, ball * m2 + length * z)
@@ -181,7 +188,9 @@ def winding_numbers(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray)
     axes = [(along + 1) % 3, (along + 2) % 3, along]  # the ray runs along the last
     x, rays = np.ascontiguousarray(vertices[:, axes]), np.ascontiguousarray(points[inside][:, axes])
     sides = np.maximum((high - low)[axes[:2]], np.finfo(float).tiny)
-    cells = np.maximum(np.sqrt(len(faces) * sides / sides[::-1]), 1.0).astype(np.int64)  # as many as faces
+    cells = np.maximum(np.sqrt(len(faces) * sides / sides[::-1]), 1.0).astype(
+        np.int64
+    )  # as many as faces
     starts, met = _faces_of_cells(x, faces, low[axes], cells / sides, cells)
     numbers[inside] = _crossings(x, faces, rays, low[axes], cells / sides, cells, starts, met)
     return numbers

@@ -35,7 +35,9 @@ def boundary_loops(faces: Index) -> list[Index]:
     rim = halves[~np.isin(forward, backward)]
     following = dict(rim.tolist())
     if len(following) != len(rim) or set(following) != set(following.values()):
-        raise ValueError("boundary loops touch or the winding is not consistent: the mesh is not manifold")
+        raise ValueError(
+            "boundary loops touch or the winding is not consistent: the mesh is not manifold"
+        )
     loops = []
     while following:
         vertex, after = next(iter(following.items()))
@@ -78,7 +80,9 @@ def check_closed(positions: np.ndarray, faces: np.ndarray) -> None:
     """
     moving = positions.ndim == 3 and positions.shape[2] == 3 and positions.size
     if not (moving and faces.ndim == 2 and faces.shape[1] == 3 and faces.size):
-        raise MeshError(f"obstacle {positions.shape} and faces {faces.shape}: expected (T, B, 3) and (F, 3)")
+        raise MeshError(
+            f"obstacle {positions.shape} and faces {faces.shape}: expected (T, B, 3) and (F, 3)"
+        )
     if faces.min() < 0 or faces.max() >= positions.shape[1]:
         raise MeshError(f"obstacle faces name a vertex outside 0..{positions.shape[1] - 1}")
     if not np.isfinite(positions).all():

@@ -9,18 +9,19 @@ The class attribute `kernels` of an `Energy` has, by use, a function of the term
     constraint      Constraints: XPBD
     training_batch  BatchKernel: the loss of trainings on a CPU
 
-Where one is missing, a solver with a slower way says so once (`warn_slow_path`); the others refuse the term.
+Where one is missing, a solver with a slower way says so once (`warn_slow_path`); the others refuse the
+term.
 
 Gauss-Seidel sweeps (vertex block descent, XPBD) move vertices between one element and the next, so their
-kernels work on one element at a time, in float64; tests/benchmarks/methods/test_minimisers.py holds them to
-the energies' gradients and Hessians.
+kernels work on one element at a time, in float64; tests/benchmarks/methods/test_minimisers.py holds them
+to the energies' gradients and Hessians.
 
 Training on a CPU evaluates one mesh in some fifty configurations, so each element is worked out for
 TRAINING_LANES of them at once, in float32: the innermost loop has a fixed length and no branch, and the
-compiler turns it into vector instructions. Vertices (N, T, V, 3) of N windows of T frames lie in memory as C
-blocks of TRAINING_LANES frames, (C, V, 3, TRAINING_LANES): the first frames of all windows, then the second
-ones, and so on (snug.kernels.skinning). tests/snug/training/test_device.py holds these kernels to the
-definitions.
+compiler turns it into vector instructions. Vertices (N, T, V, 3) of N windows of T frames lie in memory
+as C blocks of TRAINING_LANES frames, (C, V, 3, TRAINING_LANES): the first frames of all windows, then the
+second ones, and so on (snug.kernels.skinning). tests/snug/training/test_device.py holds these kernels to
+the definitions.
 """
 
 from __future__ import annotations
@@ -144,14 +145,16 @@ TRAINING_LANES = 16
 # No assumption on NaN or infinity: the guard of training must see them.
 GUARDED = {"reassoc", "contract", "arcp", "nsz"}
 
-# x (C, V, 3, TRAINING_LANES) float32 [m] -> values (C, TRAINING_LANES) [J]; the second argument is like x,
-# and the gradients [N] are added to it. The function for "training_batch" returns one.
+# x (C, V, 3, TRAINING_LANES) float32 [m] -> values (C, TRAINING_LANES) [J]; the second argument is like
+# x, and the gradients [N] are added to it. The function for "training_batch" returns one.
 BatchKernel = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 
 def batch_kernel(kernel: Any, stencils: np.ndarray, *constants: Any) -> BatchKernel:
     """Bind a compiled function (x, stencils, *constants, values, gradients) of flat arrays to an energy."""
-    stencils = stencils.astype(np.uint32)  # for a signed index is first asked whether it counts from the end
+    stencils = stencils.astype(
+        np.uint32
+    )  # for a signed index is first asked whether it counts from the end
 
     def run(x: np.ndarray, gradients: np.ndarray) -> np.ndarray:
         values = np.empty((len(x), TRAINING_LANES), np.float32)

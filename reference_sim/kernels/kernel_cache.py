@@ -1,18 +1,18 @@
 """`njit` whose compiled kernels on disk are never stale, and compiled kernels as arguments of others.
 
-numba keeps on disk what it compiled, and compiles a kernel anew when the kernel's own file has changed. It
-does not see a change in another file: in a kernel that is called, or in a constant that is imported. So each
-module's kernels are kept in a folder whose name holds a digest of the file and of both. Processes with the
-same sources find the same folder.
+numba keeps on disk what it compiled, and compiles a kernel anew when the kernel's own file has changed.
+It does not see a change in another file: in a kernel that is called, or in a constant that is imported.
+So each module's kernels are kept in a folder whose name holds a digest of the file and of both. Processes
+with the same sources find the same folder.
 
 The folders lie in `__pycache__` beside the module, else in the user's cache folder, or in NUMBA_CACHE_DIR
 where that is set. No list of modules is kept: what counts for a kernel is what its module has imported.
 
-A solver that serves any term gets the term's kernel when it runs. `kernel_argument` hands one over so that it
-is compiled in, as if it had been called by its name; the caller is compiled anew for each set of kernels.
-The argument is an array whose one field is named after the kernel and the digest of its source. So numba's
-type of it names the kernel, what numba keeps on disk is found again by another process, and a call costs no
-more than that of any other array.
+A solver that serves any term gets the term's kernel when it runs. `kernel_argument` hands one over so
+that it is compiled in, as if it had been called by its name; the caller is compiled anew for each set of
+kernels. The argument is an array whose one field is named after the kernel and the digest of its source.
+So numba's type of it names the kernel, what numba keeps on disk is found again by another process, and a
+call costs no more than that of any other array.
 """
 
 from __future__ import annotations
@@ -46,8 +46,8 @@ _folders: dict[str, Path | None] = {}
 def njit(**options: Any) -> Callable[[Any], Any]:
     """Return the decorator `numba.njit(**options)`, where cache=True means a cache that sees other files too.
 
-    What a kernel takes from another file is to be imported above the first kernel of its own file. Where no
-    folder can be written, every process compiles for itself.
+    What a kernel takes from another file is to be imported above the first kernel of its own file. Where
+    no folder can be written, every process compiles for itself.
     """
 
     def decorate(function: Any) -> Any:

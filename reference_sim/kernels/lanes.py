@@ -1,17 +1,19 @@
 """Layouts of kernels that work on several elements side by side, for loops that become vector instructions.
 
-Float64: a kernel beside its definition copies corners and constants of LANES_FLOAT64 elements into one array
-u of known size, row after row, works them out in a loop of fixed length without a branch, and hands the
-results out one by one. Within one array the compiler knows that nothing overlaps.
+Float64: a kernel beside its definition copies corners and constants of LANES_FLOAT64 elements into one
+array u of known size, row after row, works them out in a loop of fixed length without a branch, and hands
+the results out one by one. Within one array the compiler knows that nothing overlaps.
 
-Float32: the state of early-stopped L-BFGS is u (3V,), the displacement [m] from a point x_0 that float64 has.
-Differences of positions are taken there once a step, and each element keeps its own; so round-off is that of
-a displacement of millimetres and not of a body metres away. Elements come in blocks of LANES_FLOAT32, the
-last one filled up with elements of no stiffness; arrays of a block lie one quantity after the other.
-tests/reference_sim/minimise/test_compiled.py holds values and gradients to the definitions.
+Float32: the state of early-stopped L-BFGS is u (3V,), the displacement [m] from a point x_0 that float64
+has. Differences of positions are taken there once a step, and each element keeps its own; so round-off is
+that of a displacement of millimetres and not of a body metres away. Elements come in blocks of
+LANES_FLOAT32, the last one filled up with elements of no stiffness; arrays of a block lie one quantity
+after the other. tests/reference_sim/minimise/test_compiled.py holds values and gradients to the
+definitions.
 
-Rows: numba writes a short loop of known length out number by number, and what was stored in single numbers
-cannot be loaded as a vector before all of it has reached the cache. So rows are moved in vector registers.
+Rows: numba writes a short loop of known length out number by number, and what was stored in single
+numbers cannot be loaded as a vector before all of it has reached the cache. So rows are moved in vector
+registers.
 """
 
 from __future__ import annotations
@@ -65,7 +67,8 @@ def arctan2(y, x):
 def add_blocks(u, row, n, e, corners, slots, base, stride, data):
     """Add the 3 x 3 blocks of element e in lane n of u to the values of a matrix, see `BlockPlaces`.
 
-    Of its corners x corners blocks, u holds those on and below the diagonal, row after row, from `row` on.
+    Of its corners x corners blocks, u holds those on and below the diagonal, row after row, from `row`
+    on.
     """
     for a in range(corners):
         for b in range(a + 1):
@@ -214,7 +217,8 @@ def add_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
 def mixed_rows(_: Any, rows: Any, i: Any, j: Any, k: Any, u: Any, v: Any, w: Any) -> Any:
     """Return u rows[i] + v rows[j] + w rows[k], three numbers.
 
-    Rows of three lie in a flat float32 array, with one number more after the last: a row is loaded as four.
+    Rows of three lie in a flat float32 array, with one number more after the last: a row is loaded as
+    four.
     """
 
     def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
@@ -266,5 +270,7 @@ def _place(context: Any, builder: Any, kinds: Any, args: Any, size: int, loaded:
     """Return where a row of `size` numbers begins, as a vector. kinds, args: of array and row number."""
     array, number = kinds
     start = context.make_array(array)(context, builder, args[0]).data
-    place = builder.gep(start, [builder.mul(context.cast(builder, args[1], number, types.intp), WIDE(size))])
+    place = builder.gep(
+        start, [builder.mul(context.cast(builder, args[1], number, types.intp), WIDE(size))]
+    )
     return builder.bitcast(place, ir.VectorType(context.get_value_type(array.dtype), loaded).as_pointer())

@@ -26,7 +26,9 @@ from reference_sim.minimise.descent import (
 from reference_sim.potential import Potential
 
 HALVINGS = 12  # of a step before its direction is given up
-INERTIA, WEIGHT, ELEMENTS = range(3)  # places of energies: the terms of elements come last, in their order
+INERTIA, WEIGHT, ELEMENTS = range(
+    3
+)  # places of energies: the terms of elements come last, in their order
 
 # What is constant of the vertices: inertia [N/m] and weights [N] (V,); pinned: 3 times the vertex.
 Vertices = namedtuple("Vertices", "inertia weights pinned")
@@ -42,7 +44,8 @@ Memory = namedtuple("Memory", "S Y rho")  # of steps (m, 3V) [m] and changes of 
 def vertex_gradient(u, inertia, target, weights, gradient):
     """Return the energies [J] of inertia and weight, and set gradient (3V,) [N].
 
-    inertia (V,) [N/m] pulls towards target (3V,) [m]; the energy of weights (V,) [N] is counted from x_0 on.
+    inertia (V,) [N/m] pulls towards target (3V,) [m]; the energy of weights (V,) [N] is counted from x_0
+    on.
     """
     kinetic, potential = 0.0, 0.0
     for v in range(len(inertia)):
@@ -146,7 +149,9 @@ def descend(
         for _ in range(HALVINGS if slope < 0 else 0):
             trial[:] = u
             add_scaled(trial, share, p)
-            trial_value = evaluate(trial, target, vertices, terms, trial_gradient, scratch, trial_energies)
+            trial_value = evaluate(
+                trial, target, vertices, terms, trial_gradient, scratch, trial_energies
+            )
             if np.isfinite(trial_value) and trial_value <= value + SUFFICIENT_DECREASE * share * slope:
                 accepted = True
                 break
@@ -165,7 +170,11 @@ def descend(
         curvature = dot(p, gradient)
         if curvature > LEAST_CURVATURE * np.sqrt(dot(p, p) * dot(gradient, gradient)):
             newest, held = (newest + 1) % most, min(held + 1, most)
-            memory.S[newest], memory.Y[newest], memory.rho[newest] = p, gradient, np.float32(1.0) / curvature
+            memory.S[newest], memory.Y[newest], memory.rho[newest] = (
+                p,
+                gradient,
+                np.float32(1.0) / curvature,
+            )
         u[:] = trial
         gradient[:] = trial_gradient
         energies[:] = trial_energies
@@ -180,7 +189,9 @@ MEMORY = 10
 class CompiledLBFGS:
     """A minimiser of one potential. Raises ValueError for a term without a kernel, or no inertia."""
 
-    def __init__(self, potential: Potential, *, max_iterations: int, tolerance: float = TOLERANCE) -> None:
+    def __init__(
+        self, potential: Potential, *, max_iterations: int, tolerance: float = TOLERANCE
+    ) -> None:
         self.potential, self.max_iterations = potential, max_iterations
         self._terms = terms = step_terms(potential, "float32_lanes", "CompiledLBFGS")
         self._lanes: tuple[Float32Lanes, ...] = terms.kernels
@@ -263,8 +274,9 @@ class CompiledLBFGS:
 def _factor(free: np.ndarray, rest: np.ndarray, terms: StepTerms) -> tuple[Any, list[tuple]]:
     """Lay the preconditioner of free vertices (V,) bool out.
 
-    Returns pattern and constant values, at positions rest (V, 3) [m], with room for the factor; and of each
-    term whose stiffness changes from step to step its number, its kernel and the places of its lanes.
+    Returns pattern and constant values, at positions rest (V, 3) [m], with room for the factor; and of
+    each term whose stiffness changes from step to step its number, its kernel and the places of its
+    lanes.
     """
     number = np.full(len(free), -1)
     number[free] = np.arange(free.sum())
@@ -272,7 +284,9 @@ def _factor(free: np.ndarray, rest: np.ndarray, terms: StepTerms) -> tuple[Any, 
     changing = [(k, lanes) for k, lanes in enumerate(terms.kernels) if lanes.stiffness is not None]
     stencils = [number[e.stencils] for e in fixed] + [number[lanes.stencils] for _, lanes in changing]
     pattern = ScalarPattern(int(free.sum()), stencils)
-    constant = np.zeros(len(pattern.row_columns) + pattern.count)  # left of the diagonal, then the diagonal
+    constant = np.zeros(
+        len(pattern.row_columns) + pattern.count
+    )  # left of the diagonal, then the diagonal
     for energy in fixed:
         elements, values = energy.scalar_stiffness(rest)
         places = pattern.places(number[energy.stencils[elements]])

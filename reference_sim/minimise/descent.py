@@ -50,8 +50,8 @@ class LBFGSHistory:
     def direction(self, g: np.ndarray, solve: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
         """Return -H g (3n,) for a gradient g (3n,) [N] by the two-loop recursion.
 
-        solve: applies the first guess of the inverse Hessian, which the pairs correct. Source: Nocedal and
-        Wright 2006, algorithm 7.4.
+        solve: applies the first guess of the inverse Hessian, which the pairs correct. Source: Nocedal
+        and Wright 2006, algorithm 7.4.
         """
         q, alphas = -g, np.empty(len(self))
         order = np.arange(self._count - len(self), self._count) % max(self._memory, 1)  # oldest first
@@ -106,12 +106,13 @@ class Result:
     """Outcome of one minimisation. Failure is a value here, not an exception.
 
     Attributes:
-        status: one of STATUSES. "converged" means: gradient within tolerance, no negative curvature beyond
-            round-off left, of which a factorisation of the Hessian plus a tiny shift is the proof, and a
-            negligible Newton step of that matrix. A longer step is accepted where the Hessian without the
-            shift has no factorisation, as for cloth that may move rigidly: its length means nothing there.
-        relaxed: whether "converged" holds within round-off alone: the residual, or the round-off in it, is
-            above the tolerance; the reason says which.
+        status: one of STATUSES. "converged" means: gradient within tolerance, no negative curvature
+            beyond round-off left, of which a factorisation of the Hessian plus a tiny shift is the proof,
+            and a negligible Newton step of that matrix. A longer step is accepted where the Hessian
+            without the shift has no factorisation, as for cloth that may move rigidly: its length means
+            nothing there.
+        relaxed: whether "converged" holds within round-off alone: the residual, or the round-off in it,
+            is above the tolerance; the reason says which.
         gradient_norm: the relative residual [1], by which every minimisation here is stopped: the largest
             component of dPhi/dx over the free vertices, divided by the mean weight of a vertex.
     """
@@ -184,7 +185,8 @@ class Descent:
     def line_search(self, p: np.ndarray, slope: float, allowed: float | None = None) -> float:
         """Halve the step along p (3n,) until the energy falls enough, and go there.
 
-        slope: of the energy along p [J]. allowed: share of p that no term forbids, where it is known already.
+        slope: of the energy along p [J]. allowed: share of p that no term forbids, where it is known
+        already.
         Returns the share of p that was taken, 0 if none would do.
         """
         step = self.spread(p)
@@ -204,8 +206,8 @@ class Descent:
     def quasi_newton_step(self, history: LBFGSHistory, solve: Callable[[np.ndarray], np.ndarray]) -> bool:
         """Take one step of L-BFGS and add it to the history; return whether there was one.
 
-        A direction that fails is tried again without history. solve: applies the first guess of the inverse
-        Hessian to (3n,).
+        A direction that fails is tried again without history. solve: applies the first guess of the
+        inverse Hessian to (3n,).
         """
         while True:
             p, g = history.direction(self.g, solve), self.g

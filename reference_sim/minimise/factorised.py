@@ -86,11 +86,11 @@ LAST_SHIFT = 1e12  # in units of M/dt^2
 def convergence_check(run: NewtonRun, values: np.ndarray, round_off: float) -> Stop | None:
     """Return "converged", "stalled" on a saddle, or None to go on, where the gradient of `run` is small.
 
-    Asks whether the true Hessian is positive definite (up to round-off, so that rigid motions of an unpinned
-    cloth do not count) and its step small. Off a saddle it takes a step, which is an iteration.
+    Asks whether the true Hessian is positive definite (up to round-off, so that rigid motions of an
+    unpinned cloth do not count) and its step small. Off a saddle it takes a step, which is an iteration.
 
-    values (nnz,): of its true Hessian. round_off: of the residual [1]; it excuses one above the tolerance,
-    and the reason says so.
+    values (nnz,): of its true Hessian. round_off: of the residual [1]; it excuses one above the
+    tolerance, and the reason says so.
     """
     tolerance, step_tolerance = run.newton.tolerance, run.newton.step_tolerance
     residual = run.gradient_norm()
@@ -99,7 +99,9 @@ def convergence_check(run: NewtonRun, values: np.ndarray, round_off: float) -> S
     if residual > tolerance:
         why = f"round-off: residual {residual:.1e} above tolerance {tolerance:.1e}"
     elif relaxed:
-        why = f"round-off: up to {round_off:.1e} in the residual, {residual:.1e}, tolerance {tolerance:.1e}"
+        why = (
+            f"round-off: up to {round_off:.1e} in the residual, {residual:.1e}, tolerance {tolerance:.1e}"
+        )
     if run.factorise(values, run.hessian.tiny_shift(values)):
         step = float(np.abs(run.solve(-run.g)).max(initial=0.0))
         small = step <= step_tolerance or residual == 0.0

@@ -4,12 +4,13 @@ The first guess of the inverse Hessian is the inverse of an n x n matrix that x,
 dt^2, (mu + lambda/2) times the cotangent Laplacian, and the curvature of the contacts (Liu, Bouaziz and
 Kavan 2017). It is factorised once per minimisation and costs three triangular solves an iteration, so the
 first hundredth of the gap comes several times sooner than with Newton; the last digits do not. So Newton
-takes over where the relative residual is SWITCH, and its factorisations serve several steps each. The first
-has all negative curvature taken out, which saves 13 to 20 % of the factorisations of a T-shirt's step.
+takes over where the relative residual is SWITCH, and its factorisations serve several steps each. The
+first has all negative curvature taken out, which saves 13 to 20 % of the factorisations of a T-shirt's
+step.
 
-What comes before Newton needs no more than float32. So it is compiled.CompiledLBFGS, where that has kernels
-for all terms: an iteration is then so cheap that it goes on to COMPILED_SWITCH. Newton ends in float64 either
-way, at the same tolerance.
+What comes before Newton needs no more than float32. So it is compiled.CompiledLBFGS, where that has
+kernels for all terms: an iteration is then so cheap that it goes on to COMPILED_SWITCH. Newton ends in
+float64 either way, at the same tolerance.
 """
 
 from __future__ import annotations
@@ -48,8 +49,8 @@ class LBFGS:
 
     Args:
         memory: number of remembered steps; 0 is preconditioned gradient descent.
-        finish: whether Newton takes over, at SWITCH or COMPILED_SWITCH, or after PATIENCE iterations. Without
-            it nothing looks at the curvature, and no result is "converged".
+        finish: whether Newton takes over, at SWITCH or COMPILED_SWITCH, or after PATIENCE iterations.
+            Without it nothing looks at the curvature, and no result is "converged".
     """
 
     def __init__(
@@ -168,8 +169,8 @@ class LBFGSRun(Descent):
         return self.preconditioner.solver.solve(q.reshape(-1, 3)).ravel()
 
 
-# In units of M/dt^2 at 30 steps a second. Cloth that nothing holds needs it against its rigid motions alone;
-# 1 in its place slows the soft bending modes down ten times.
+# In units of M/dt^2 at 30 steps a second. Cloth that nothing holds needs it against its rigid motions
+# alone; 1 in its place slows the soft bending modes down ten times.
 FLOOR = 1e-4
 
 

@@ -1,8 +1,8 @@
 """Minimisers by name, and the minimisation of one time step.
 
-A step of most potentials is one call of their minimiser, from the first guess. A term that joins late, as a
-barrier, which nothing may pass, is left out until the cloth comes near itself, and approached along a free
-way.
+A step of most potentials is one call of their minimiser, from the first guess. A term that joins late, as
+a barrier, which nothing may pass, is left out until the cloth comes near itself, and approached along a
+free way.
 """
 
 from __future__ import annotations
@@ -41,7 +41,8 @@ def make_minimiser(
 ) -> Minimiser:
     """Return a minimiser, for a caller that minimises the same potential again and again.
 
-    method: a name in MINIMISERS, or a function of potential and options. Raises ValueError for other names.
+    method: a name in MINIMISERS, or a function of potential and options. Raises ValueError for other
+    names.
     """
     if callable(method):
         return method(potential, **options)
@@ -89,8 +90,8 @@ class StepMinimiser:
     The user of `potential`, inertia included, freezes it before each step. options: see `TimeStepper`.
 
     Attributes:
-        options: as given, with the method by default: "newton" with a term whose pairs change, else "lbfgs",
-            whose preconditioner knows nothing of pairs that come and go.
+        options: as given, with the method by default: "newton" with a term whose pairs change, else
+            "lbfgs", whose preconditioner knows nothing of pairs that come and go.
         opening_method: of the minimisation without the terms that join late; "" where none does.
     """
 
@@ -135,9 +136,9 @@ class StepMinimiser:
     def _open(self, opening: Minimiser, x: np.ndarray, guess: np.ndarray) -> Result:
         """Minimise without the terms that join late, and with them only where they have something to say.
 
-        The minimum without them is the answer if the way there is free and they are zero around it. If not,
-        the minimisation with them starts on the way there: from `guess` on if that can be reached, else from
-        x on. Cloth meets itself late on such a way, for a guess moves it with the body.
+        The minimum without them is the answer if the way there is free and they are zero around it. If
+        not, the minimisation with them starts on the way there: from `guess` on if that can be reached,
+        else from x on. Cloth meets itself late on such a way, for a guess moves it with the body.
         """
         potential, opened = self.potential, opening.minimise(guess)
         y = opened.positions if np.isfinite(opened.positions).all() else guess

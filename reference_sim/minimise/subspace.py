@@ -2,11 +2,12 @@
 
     min over q of Phi(x(q)),   x_v(q) = c_v + R_v sum_k U_vk q_k
 
-U is constant. R_v and c_v, turn and place of vertex v, change from step to step, as skinning changes them.
-The columns of U are the shape functions of handles, principal components, or the last layer of a network. In
-q the gradient is B^T dPhi/dx and the Hessian B^T H B with B_vk = R_v U_vk: a dense one, of as many rows as
-there are numbers. All else is `minimise.newton`: the true Hessian, projected element by element as far as
-need be, line search, and the test of curvature, here of the subspace, before a result is "converged".
+U is constant. R_v and c_v, turn and place of vertex v, change from step to step, as skinning changes
+them. The columns of U are the shape functions of handles, principal components, or the last layer of a
+network. In q the gradient is B^T dPhi/dx and the Hessian B^T H B with B_vk = R_v U_vk: a dense one, of as
+many rows as there are numbers. All else is `minimise.newton`: the true Hessian, projected element by
+element as far as need be, line search, and the test of curvature, here of the subspace, before a result
+is "converged".
 """
 
 from __future__ import annotations

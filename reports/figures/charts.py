@@ -40,7 +40,9 @@ if TYPE_CHECKING:
 
 SOLVERS = Style("Solvers stopped early", "#A3324B", "X")
 STARTED = "warm-started"  # role of solvers that start from another method
-OF_REFERENCE = "reference-variant"  # role of methods that only say how the reference depends on its options
+OF_REFERENCE = (
+    "reference-variant"  # role of methods that only say how the reference depends on its options
+)
 
 
 @dataclass(frozen=True)
@@ -58,8 +60,8 @@ class Curve:
 def curves_of(run: Run, points: Iterable[Point]) -> list[Curve]:
     """Return a curve for each family of networks and baselines, and one for solvers stopped early.
 
-    A curve of solvers joins the best at each run time; the others lie aside. So do those that start from one
-    and the same method. Variants of the reference are left out.
+    A curve of solvers joins the best at each run time; the others lie aside. So do those that start from
+    one and the same method. Variants of the reference are left out.
     """
     points = list(points)
     shown = [p for p in points if run.methods[p.method].role != OF_REFERENCE] or points
@@ -87,7 +89,9 @@ def _family(run: Run, members: list[Point]) -> Curve:
     if method.level is None:
         return Curve(members, style(run, method.name))
     members.sort(key=lambda point: run.methods[point.method].level or 0.0)
-    levels = dict.fromkeys(power_text(run.methods[p.method].level or 0.0) for p in (members[0], members[-1]))
+    levels = dict.fromkeys(
+        power_text(run.methods[p.method].level or 0.0) for p in (members[0], members[-1])
+    )
     look = family_style(run, method)
     return Curve(members, replace(look, label=f"{look.label}, {' to '.join(levels)}"))
 
@@ -228,7 +232,9 @@ def energy_series(run: Run) -> Iterator[Drawing]:
         axes.set(title=term.capitalize(), xlabel="time [s]")
     panels[0].set_ylabel("energy [J]")
     fit(figure, [style(run, method) for method in methods])
-    caption = f"{scene}: energy of each frame by term, logarithmic. A frame with no energy at all is a gap."
+    caption = (
+        f"{scene}: energy of each frame by term, logarithmic. A frame with no energy at all is a gap."
+    )
     yield Drawing(figure, f"energy_series_{file_name(scene)}", caption)
 
 

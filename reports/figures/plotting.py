@@ -39,8 +39,8 @@ class Style:
     line: Line = "-"
 
 
-# By family; a method that shares its family with none is one by itself. Only families that are drawn as one
-# line have a label here: any other label is the method's own.
+# By family; a method that shares its family with none is one by itself. Only families that are drawn as
+# one line have a label here: any other label is the method's own.
 KNOWN = {
     "simulation": Style("", "#000000", "*"),
     "simulation-perturbed": Style("", "#444444", "x", "--"),
@@ -80,8 +80,8 @@ _SPARE_MARKERS = ("h", "8", "d", "v", "p")
 def family_style(run: Run, method: ReportedMethod) -> Style:
     """Return the style of a method's family; an unknown one has a spare colour that depends on its name.
 
-    A method that starts from another has the look of that one, whether it ran or not, with a marker of its
-    own where it is a solver; an ablation has the marker of its base alone.
+    A method that starts from another has the look of that one, whether it ran or not, with a marker of
+    its own where it is a solver; an ablation has the marker of its base alone.
     """
     label = method.label if method.level is None else method.label.partition(",")[0]
     if known := KNOWN.get(method.family):

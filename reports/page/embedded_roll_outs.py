@@ -2,8 +2,9 @@
 
 Packed arrays, as the page carries them: integers, predicted from frame to frame, deflated, in base64.
 
-The browser undoes it (data.js). Positions are 16-bit steps of one length per trajectory, so they are off by
-half a step at most; values per vertex are 8 bits on the scale of square roots, fine where they are small.
+The browser undoes it (data.js). Positions are 16-bit steps of one length per trajectory, so they are off
+by half a step at most; values per vertex are 8 bits on the scale of square roots, fine where they are
+small.
 """
 
 from __future__ import annotations
@@ -117,7 +118,9 @@ def groups(folder: RunFolder, run: Run) -> Iterator[tuple[str, dict[str, int]]]:
                 methods = run.ordered(seeds[scene].index)
                 methods = [m for m in methods if (run.methods[m].role in FIRST) is leading]
                 chosen = {m: int(seeds[scene, m]) for m in methods}
-                stored = {m: s for m, s in chosen.items() if folder.trajectory_path(scene, m, s).is_file()}
+                stored = {
+                    m: s for m, s in chosen.items() if folder.trajectory_path(scene, m, s).is_file()
+                }
                 if stored:
                     yield scene, stored
 

@@ -96,7 +96,9 @@ def _printed(table: Table, reference: tuple[str, dict[str, str]]) -> list[str]:
     """Return a row of the paper's values: its label stands in the last column of texts."""
     label, values = reference
     texts = [column.name for column in table.columns if column.text]
-    return [label if column.name == texts[-1] else values.get(column.name, "") for column in table.columns]
+    return [
+        label if column.name == texts[-1] else values.get(column.name, "") for column in table.columns
+    ]
 
 
 def _column(run: Run, column: Column) -> dict[str, Any]:
@@ -105,7 +107,12 @@ def _column(run: Run, column: Column) -> dict[str, Any]:
     better = metric.lower_is_better if metric else None
     if better is not None:
         definition += f"; {'lower' if better else 'higher'} is better"
-    return {"title": column.title, "unit": column.unit_above, "words": column.text, "definition": definition}
+    return {
+        "title": column.title,
+        "unit": column.unit_above,
+        "words": column.text,
+        "definition": definition,
+    }
 
 
 def _cell(text: dict[str, str], cell: Cell) -> str | list[Any]:
@@ -115,7 +122,12 @@ def _cell(text: dict[str, str], cell: Cell) -> str | list[Any]:
         return text["text"]
     number = None if value is None or math.isnan(value) else max(min(float(value), 1e300), -1e300)
     # The last digits of a mean differ between processors; a page that is kept must not.
-    return [text["text"], None if number is None else float(f"{number:.12g}"), text["spread"], text["mark"]]
+    return [
+        text["text"],
+        None if number is None else float(f"{number:.12g}"),
+        text["spread"],
+        text["mark"],
+    ]
 
 
 HERE = Path(__file__).parent

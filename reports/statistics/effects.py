@@ -1,8 +1,8 @@
 """Effect of one method against another on a scale where it is symmetric, with its uncertainty.
 
-Three scales: logarithms of positive numbers; shares of skinning's excess energy, for energies whose zero is a
-choice (reports.statistics.relative_excess); plain differences for what is neither. Costs have no interval but
-a range.
+Three scales: logarithms of positive numbers; shares of skinning's excess energy, for energies whose zero
+is a choice (reports.statistics.relative_excess); plain differences for what is neither. Costs have no
+interval but a range.
 """
 
 from __future__ import annotations
@@ -60,13 +60,13 @@ class Effect:
         limits: of costs, the least and the greatest of what was measured, on the scale.
         possible: the least and the greatest effect that there can be, which cut the interval.
         least_p: p-value below which no test of so few motions can go.
-        uncertainty: standard deviation of the value over the reference's ensemble; 0 where no member changes
-            it, or none ran.
+        uncertainty: standard deviation of the value over the reference's ensemble; 0 where no member
+            changes it, or none ran.
         unit: of a plain difference, what 1 is of: TIE of it is no difference; 0 where that is unknown.
         complete: neither mean lacks a scene or a seed.
         one_seed: whether a mean is of one seed, and nobody knows how far another would move it.
-        exact: whether no clock gave the two, so that one value each is all there is, such as the size of a
-            network.
+        exact: whether no clock gave the two, so that one value each is all there is, such as the size of
+            a network.
     """
 
     value: float
@@ -144,7 +144,9 @@ class Effect:
         if self.scale == EXCESS:  # points between typical shares of the two
             first, second = self.second + self.value, self.second
             # The mean nearer to 0 stays and the other moves: so it is the same in either order.
-            first, second = (first, first - value) if abs(first) < abs(second) else (second + value, second)
+            first, second = (
+                (first, first - value) if abs(first) < abs(second) else (second + value, second)
+            )
             return float(off_scale(first, EXCESS)) - float(off_scale(second, EXCESS))
         return float(off_scale(value, self.scale))
 
@@ -166,18 +168,19 @@ def effect(one: Mean, other: Mean, scale: str = "", *, unit: float | None = None
 
     Segments of one recording are one motion, the mean of its segments on the scale: they are alike, and
     intervals over segments would cover too little.
-    Positive numbers are compared by their logarithms, cell by cell: a violent motion has more of every energy
-    with every method, and what came out a million times as large with one seed is told apart all the same.
+    Positive numbers are compared by their logarithms, cell by cell: a violent motion has more of every
+    energy with every method, and what came out a million times as large with one seed is told apart all
+    the same.
 
-    The standard error is that of a bootstrap that draws motions and seeds, each with replacement and of each
-    one fewer than there are: the variance is then that of the mean, not (n - 1) / n of it (Hesterberg 2015).
-    Motions are drawn for both methods at once; so are seeds within a pairing group, others by themselves.
-    Drawn crossed, the variance is on average no smaller than the true one (Owen 2007, "The pigeonhole
-    bootstrap"). The interval is the value and Student's quantile times the error, for percentiles of so few
-    values cover too little; the degrees of freedom are Satterthwaite's (1946), of the parts that motions and
-    seeds have in the variance. A network of one seed is taken to have the scatter of the one beside it; what
-    no seed changes has none. What is the same with every motion, such as the time of a training, is one
-    number and was not repeated; so with seeds.
+    The standard error is that of a bootstrap that draws motions and seeds, each with replacement and of
+    each one fewer than there are: the variance is then that of the mean, not (n - 1) / n of it
+    (Hesterberg 2015). Motions are drawn for both methods at once; so are seeds within a pairing group,
+    others by themselves. Drawn crossed, the variance is on average no smaller than the true one (Owen
+    2007, "The pigeonhole bootstrap"). The interval is the value and Student's quantile times the error,
+    for percentiles of so few values cover too little; the degrees of freedom are Satterthwaite's (1946),
+    of the parts that motions and seeds have in the variance. A network of one seed is taken to have the
+    scatter of the one beside it; what no seed changes has none. What is the same with every motion, such
+    as the time of a training, is one number and was not repeated; so with seeds.
     """
     scale = scale or (RATIO if _positive(one) and _positive(other) else DIFFERENCE)
     first, second = (_grid(mean, scale) for mean in (one, other))
@@ -232,9 +235,9 @@ def _one_seed(mean: Mean, beside: Mean) -> bool:
 def _over_ensemble(one: Mean, other: Mean, scale: str) -> float:
     """Return the standard deviation of the effect's value over the reference and its ensemble, on the scale.
 
-    Each member takes the reference's place in every scene at once, so only members that converged in all of
-    them count. Where fewer than LEAST_MEMBERS did, or single changes are unknown, as between two runs with
-    ensembles of their own, both uncertainties add up as independent ones.
+    Each member takes the reference's place in every scene at once, so only members that converged in all
+    of them count. Where fewer than LEAST_MEMBERS did, or single changes are unknown, as between two runs
+    with ensembles of their own, both uncertainties add up as independent ones.
     """
     in_scenes = [
         mean.moved.get(cell, {}).keys() for mean in (one, other) if mean.moved for cell in mean.cells
@@ -242,7 +245,9 @@ def _over_ensemble(one: Mean, other: Mean, scale: str) -> float:
     names = set.intersection(*map(set, in_scenes)) if in_scenes else set()
     if len(names) < LEAST_MEMBERS:
         slopes = [_slope(mean, scale) for mean in (one, other)]
-        return math.hypot(*(slope * (mean.uncertainty or 0.0) for slope, mean in zip(slopes, (one, other))))
+        return math.hypot(
+            *(slope * (mean.uncertainty or 0.0) for slope, mean in zip(slopes, (one, other)))
+        )
     changes = [_moved_by(one, name, scale) - _moved_by(other, name, scale) for name in sorted(names)]
     return spread(changes) or 0.0
 
@@ -332,7 +337,9 @@ def _bootstrap(grids: Sequence[np.ndarray]) -> tuple[float, float]:
     free = np.array([len(grids[0]), *(grid.shape[1] for grid in grids)]) - 1
     known = parts[free > 0] ** 2 / free[free > 0]
     # Where only motion and seed together scatter, nothing tells: the fewest that any factor has.
-    freedom = parts.sum() ** 2 / known.sum() if known.sum() > 0.0 else float(free[free > 0].min(initial=1))
+    freedom = (
+        parts.sum() ** 2 / known.sum() if known.sum() > 0.0 else float(free[free > 0].min(initial=1))
+    )
     return float(np.std(draws)), float(freedom)
 
 

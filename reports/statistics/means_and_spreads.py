@@ -28,11 +28,12 @@ class Mean:
     """Mean of a metric, its spread over seeds, and the cells it was taken over.
 
     seeds: how many have the metric. asked: number of cells that should have it, every seed in every
-    scene in which any method has the metric; where fewer have, the mean is not `complete` and the table must
-    say so. stalled: a solver left some frames of some cell unconverged. seeded: another seed would give
-    another value. cells: value of each (scene, seed). pairing_group: means of one group are compared seed by
-    seed; empty for none. uncertainty: in the metric's unit, how far an equally valid reference would move the
-    mean; None if unknown. moved: change of a cell's value by each of those references, where it is known.
+    scene in which any method has the metric; where fewer have, the mean is not `complete` and the table
+    must say so. stalled: a solver left some frames of some cell unconverged. seeded: another seed would
+    give another value. cells: value of each (scene, seed). pairing_group: means of one group are compared
+    seed by seed; empty for none. uncertainty: in the metric's unit, how far an equally valid reference
+    would move the mean; None if unknown. moved: change of a cell's value by each of those references,
+    where it is known.
     """
 
     value: float
@@ -76,7 +77,8 @@ def means(frame: pd.DataFrame, *keys: str) -> pd.Series:
 
     Args:
         frame: rows as Run.frame has them.
-        keys: columns that make a group, such as "garment", "method", "metric"; the last two are among them.
+        keys: columns that make a group, such as "garment", "method", "metric"; the last two are among
+            them.
     """
     names = list(keys)
     place, end = (
@@ -194,8 +196,9 @@ def ensemble_spread(run: Run, rows: pd.DataFrame, metric: str) -> pd.Series:
 def in_spreads(run: Run, rows: pd.DataFrame, method: str, metric: str) -> float | None:
     """Return how many spreads of the reference's ensemble a method is away from the reference.
 
-    In each scene the spread is `ensemble_spread`, and the method's error the root mean square over its seeds.
-    The result is the mean error of the scenes over their mean spread; None where no scene has a spread.
+    In each scene the spread is `ensemble_spread`, and the method's error the root mean square over its
+    seeds. The result is the mean error of the scenes over their mean spread; None where no scene has a
+    spread.
     """
     kept = rows[(rows["metric"] == metric) & rows["usable"] & (rows["method"] == method)]
     squares = (kept["value"] - AT_REFERENCE[metric]) ** 2
@@ -221,7 +224,9 @@ def half_of(mean: Mean) -> Mean:
     return replace(mean, value=HALF, cells=dict.fromkeys(mean.cells, HALF), seeded=False)
 
 
-def with_shares(rows: pd.DataFrame, frames: pd.DataFrame, term: str, one: str, other: str) -> pd.DataFrame:
+def with_shares(
+    rows: pd.DataFrame, frames: pd.DataFrame, term: str, one: str, other: str
+) -> pd.DataFrame:
     """Return the rows and, for either method, the share of frames in which it has more energy [%].
 
     Args:
@@ -238,7 +243,9 @@ def with_shares(rows: pd.DataFrame, frames: pd.DataFrame, term: str, one: str, o
     above = {one: both[term] > both[f"{term}_other"], other: both[term] < both[f"{term}_other"]}
     parts = [rows]
     for method, more in above.items():
-        shares = (100.0 * more).groupby([both["scene"], both["seed"]]).mean().rename("share").reset_index()
+        shares = (
+            (100.0 * more).groupby([both["scene"], both["seed"]]).mean().rename("share").reset_index()
+        )
         known = rows[(rows["method"] == method) & (rows["metric"] == f"energy/{term}") & rows["usable"]]
         shared = known.merge(shares, on=["scene", "seed"])
         metric = share_of_frames(term)

@@ -50,7 +50,10 @@ def stress_tests(run: Run) -> pd.DataFrame:
 def counted(run: Run) -> dict[str, Counter[str]]:
     """Count by status how the cells, checks and stress tests of the run ended."""
     cells = run.frame[(run.frame["case"] == "") & (run.frame["method"] != "")]
-    best_first = {"stalled": 0, "ok": 1}  # what has any usable number has run, whatever became of the others
+    best_first = {
+        "stalled": 0,
+        "ok": 1,
+    }  # what has any usable number has run, whatever became of the others
     cells = cells.sort_values("status", key=lambda s: s.map(best_first).fillna(2), kind="stable")
     judged = checks(run)
     groups = {
@@ -64,12 +67,15 @@ def counted(run: Run) -> dict[str, Counter[str]]:
 def overstretched(run: Run) -> list[tuple[str, str, float, float]]:
     """List trained networks with more strain than the reference, the worst first.
 
-    Each with method, scene, strain [J] of its worst frame, else the mean, and the ratio to the reference's.
+    Each with method, scene, strain [J] of its worst frame, else the mean, and the ratio to the
+    reference's.
     """
     networks = [name for name in run.with_role("network") if not run.methods[name].base]
     strains: dict[tuple[str, str], tuple[float, float]] = {}
     for metric in STRAINS:
-        rows = run.frame[(run.frame["metric"] == metric) & run.frame["usable"] & (run.frame["garment"] != "")]
+        rows = run.frame[
+            (run.frame["metric"] == metric) & run.frame["usable"] & (run.frame["garment"] != "")
+        ]
         values = rows.groupby(["scene", "method"])["value"].mean()
         for (scene, method), value in values.items():
             base = values.get((scene, run.reference))
@@ -88,8 +94,9 @@ MOST_EXTERNAL = 3  # of these that page one shows
 def leads(run: Run, rows: pd.DataFrame) -> list[str]:
     """Choose the methods of page one that these rows have.
 
-    They are the reference, SNUG (or SNUG by another recipe, or another network), roll-outs of the user, the
-    paper's rival or another network, and a baseline. Ablations count as networks where a run has no others.
+    They are the reference, SNUG (or SNUG by another recipe, or another network), roll-outs of the user,
+    the paper's rival or another network, and a baseline. Ablations count as networks where a run has no
+    others.
     """
     have = set(rows[rows["usable"]]["method"])
     learned = [name for name in run.with_role(*LEARNED) if name in have]

@@ -1,8 +1,9 @@
 """Claims of the paper about its method, as data, and whether each claim holds in a run.
 
-Santesteban, Otaduy, Casas: SNUG, CVPR 2022. Nothing else in a report is judged. Claims marked primary are one
-family, the same in every run: their p-values are corrected by Holm for all of the family, whether or not a
-run can test each. All other claims are exploratory: their p-values are not corrected, and a table says so.
+Santesteban, Otaduy, Casas: SNUG, CVPR 2022. Nothing else in a report is judged. Claims marked primary are
+one family, the same in every run: their p-values are corrected by Holm for all of the family, whether or
+not a run can test each. All other claims are exploratory: their p-values are not corrected, and a table
+says so.
 """
 
 from __future__ import annotations
@@ -86,7 +87,9 @@ TERMS = "Table 2: each term of the loss brings the curvature nearer to the simul
 REALISM = "Section 4.3: all terms contribute to the realism; tested by distance from the simulation"
 COLLISION = "Section 3.4: the collision term is crucial; tested by the area inside the body"
 COSTS = "Table 3: smaller, faster and sooner trained than supervised methods"
-SPEED_UP = "Abstract: training two orders of magnitude faster than supervised methods, their data included"
+SPEED_UP = (
+    "Abstract: training two orders of magnitude faster than supervised methods, their data included"
+)
 SIMULATOR = "Section 4.3: the simulation is several orders of magnitude slower; at least two"
 POST_PROCESSED = f"{SIMULATOR}; with collision post-processing, as the authors' network is released"
 SMOOTH = "Figure 5: vertex-wise supervision smooths wrinkles"
@@ -95,11 +98,16 @@ AUGMENTED = "; here SNUG alone learns from augmented motions"
 UNSEEN = f"Section 1: generalises better than supervision to unseen motion{AUGMENTED}"
 DETAIL = f"Figure 5: SNUG learns more realistic detail than vertex-wise supervision{AUGMENTED}"
 UNSEEN_DISTANCE = f"{UNSEEN}; tested by distance from the simulation"
-UNSEEN_EQUAL = "Section 1, both networks with as many frames and steps: generalises better than supervision"
+UNSEEN_EQUAL = (
+    "Section 1, both networks with as many frames and steps: generalises better than supervision"
+)
 STRICTER = "; tested more strictly: "  # before a condition that the paper's words do not ask for
-CLOSE = f"Figure 7: close to offline simulation on unseen motion{STRICTER}no more energy than simulated cloth"
+CLOSE = (
+    f"Figure 7: close to offline simulation on unseen motion{STRICTER}no more energy than simulated cloth"
+)
 OTHERS = (
-    "Figure 7: at least on par with other data-driven methods; here with more steps, and on augmented motions"
+    "Figure 7: at least on par with other data-driven methods; here with more steps, and on augmented "
+    "motions"
 )
 SPRINGS = "Figure 3: springs deform less expressively than StVK; here, networks trained on either"
 MATERIAL = "Figure 3, with all of PBNS's material, springs and unscaled hinges"
@@ -252,7 +260,8 @@ def _compared(run: Run, frame: pd.DataFrame, claim: Claim) -> Comparison:
         if one is None or other is None:
             return Comparison(metric, one, other, None)
         far = effect(one, half_of(one), DIFFERENCE)
-        # Shares lie between 0 and 100 %: of motions that agree Student's t makes more than the sign test can.
+        # Shares lie between 0 and 100 %: of motions that agree Student's t makes more than the sign test
+        # can.
         far = replace(far, possible=(-HALF, HALF), least_p=min(1.0, 2.0 * 0.5**far.motions))
         if far.error is None and far.motions > 1:  # all or none of the frames in every motion
             far = replace(far, error=0.0, covers="motions")
@@ -278,8 +287,8 @@ def verdict(claim: Claim, far: Effect, p: float | None) -> str:
 def verdict_of_failed(claim: Claim, compared: Comparison, frame: pd.DataFrame) -> tuple[str, str]:
     """Return verdict and remark where no roll-out of one method finished; both empty elsewhere.
 
-    One whose roll-outs all diverged has more of an answer of which less is better, with as many motions and
-    seeds as a test asks for. Its cost has no verdict: no time of it is usable.
+    One whose roll-outs all diverged has more of an answer of which less is better, with as many motions
+    and seeds as a test asks for. Its cost has no verdict: no time of it is usable.
     """
     finished, name, which = compared.one, claim.higher, "second"
     if finished is None:
@@ -288,7 +297,9 @@ def verdict_of_failed(claim: Claim, compared: Comparison, frame: pd.DataFrame) -
     answer = compared.metric.lower_is_better and compared.metric.of == "answer"
     if not answer or finished is None or failed.empty or failed["usable"].any():
         return "", ""
-    motions = {recording_of(scene) for scene, _ in finished.cells} & set(map(recording_of, failed["scene"]))
+    motions = {recording_of(scene) for scene, _ in finished.cells} & set(
+        map(recording_of, failed["scene"])
+    )
     if set(failed["status"]) != {"diverged"}:
         return OPEN, f": no roll-out of the {which} finished"
     if len(motions) < LEAST_MOTIONS:

@@ -12,11 +12,14 @@ from reports.statistics.means_and_spreads import ensemble_spread, mean_of, means
 
 TIME, REPEATS = "cost/frame", "cost/spread"
 WHOLE = "cost/whole"  # TIME is a method's own work; this is all from pose to world vertices
-# Of the method's own step first: no chaos blurs them. Then those of the roll-out against the simulation's.
+# Of the method's own step first: no chaos blurs them. Then those of the roll-out against the
+# simulation's.
 ERRORS = (
     "gap/energy", "step/curvature", "step/distance", "curvature/error", "distance/rms", "curvature/histogram",
 )  # fmt: skip
-PLANES = {"gap/energy": "gap/refrozen"}  # what the reference leaves where its planes are searched at its end
+PLANES = {
+    "gap/energy": "gap/refrozen"
+}  # what the reference leaves where its planes are searched at its end
 SMALLER_STEPS = "simulation-dt"  # a family of another problem: its steps have another potential
 # Of the step's own potential, which another step size changes.
 OWN_STEP = ("gap/energy", "step/curvature", "step/distance")
@@ -28,8 +31,8 @@ class Point:
     """Run time [ms per frame] and error of a method.
 
     time_spread: how far runs lie apart [ms]: largest less smallest repeat where it was repeated, else two
-    standard deviations over seeds. error_spread: one standard deviation over seeds or, where that is more,
-    the spread over the reference's ensemble. Both 0 where unknown.
+    standard deviations over seeds. error_spread: one standard deviation over seeds or, where that is
+    more, the spread over the reference's ensemble. Both 0 where unknown.
     fewer: remark on seeds that are missing, empty where none is.
     """
 
@@ -60,14 +63,18 @@ def points_of(run: Run, frame: pd.DataFrame, scenes: Sequence[str], metric: str)
     wide = means(rows, "method", "metric")
     points = []
     for method in run.ordered(rows["method"]):
-        time, error, inference, repeats = (wide.get((method, name)) for name in (x, metric, TIME, REPEATS))
+        time, error, inference, repeats = (
+            wide.get((method, name)) for name in (x, metric, TIME, REPEATS)
+        )
         if time is None or error is None:
             continue
         spread = 2.0 * (time.spread or 0.0)
         if repeats is not None and inference is not None:
             spread = inference.value * repeats.value / 100.0
         points.append(
-            Point(method, time.value, error.value, spread, error.spread_or_uncertainty or 0.0, error.fewer)
+            Point(
+                method, time.value, error.value, spread, error.spread_or_uncertainty or 0.0, error.fewer
+            )
         )
     return points
 
@@ -117,7 +124,9 @@ def indistinct(run: Run, rows: pd.DataFrame, metric: str) -> float:
     leaves on contact planes searched at its end. 0 where none is known.
     """
     if metric in PLANES:
-        kept = rows[rows["usable"] & (rows["metric"] == PLANES[metric]) & (rows["method"] == run.reference)]
+        kept = rows[
+            rows["usable"] & (rows["metric"] == PLANES[metric]) & (rows["method"] == run.reference)
+        ]
         of_scene = kept.groupby("scene", observed=True)["value"].mean().abs()
     else:
         of_scene = ensemble_spread(run, rows, metric)
@@ -156,7 +165,9 @@ def error_points(run: Run, rows: pd.DataFrame, metric: str) -> list[Point]:
     # Smaller steps have errors of the garment, but none of the reference's own step.
     left_out = (SMALLER_STEPS,) if metric in OWN_STEP else ()
     reference = run.with_role("reference")
-    kept = [p for p in points if run.methods[p.method].family not in left_out and p.method not in reference]
+    kept = [
+        p for p in points if run.methods[p.method].family not in left_out and p.method not in reference
+    ]
     return [p for p in kept if p.time > 0.0]
 
 
@@ -166,7 +177,9 @@ ACCURACIES = ("gap/energy", "curvature/error")
 
 def rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
     """Return the solvers that SNUG competes with: the reference, and the fastest ones as accurate."""
-    names = [run.reference] if mean_of(frame[frame["scene"].isin(list(scenes))], run.reference, TIME) else []
+    names = (
+        [run.reference] if mean_of(frame[frame["scene"].isin(list(scenes))], run.reference, TIME) else []
+    )
     for metric in ACCURACIES:
         points = points_of(run, frame, scenes, metric)
         network = next((p for p in points if p.method == NETWORK), None)
@@ -182,7 +195,9 @@ def compared_scenes(run: Run, frame: pd.DataFrame) -> list[str]:
     """
     timed = frame[frame["usable"] & (frame["metric"] == TIME) & (frame["garment"] != "")]
     levels = {name for name, method in run.methods.items() if method.level is not None}
-    both = set(timed[timed["method"] == NETWORK]["scene"]) & set(timed[timed["method"].isin(levels)]["scene"])
+    both = set(timed[timed["method"] == NETWORK]["scene"]) & set(
+        timed[timed["method"].isin(levels)]["scene"]
+    )
     rows = timed[timed["scene"].isin(both)]
     of_speed = rows[rows["suite"] == "speed"]
     return next(iter(run.garments(of_speed if len(of_speed) else rows).values()), [])
@@ -191,7 +206,8 @@ def compared_scenes(run: Run, frame: pd.DataFrame) -> list[str]:
 def reference_scenes(run: Run) -> list[str]:
     """Return the scenes of the first garment in which references are compared with each other.
 
-    Those of suite speed in which SNUG was timed beside a truncated solver; without any, all whole motions.
+    Those of suite speed in which SNUG was timed beside a truncated solver; without any, all whole
+    motions.
     """
     clips = compared_scenes(run, run.cells("speed"))
     return clips or next(iter(run.garments(run.garment_rows).values()), [])

@@ -5,8 +5,8 @@ Of the total energy E of one motion and seed it is
     100 (E(method) - E(reference)) / (E(skinning) - E(reference)),
 
 0 for the reference, 100 for the garment that only follows the skin, and below 0 for less energy than the
-reference has. The zero of potential energy cancels. It is the primary measure of how near a method is. Any
-other energy whose zero is a choice, as gravity, is divided by the same excess of the total.
+reference has. The zero of potential energy cancels. It is the primary measure of how near a method is.
+Any other energy whose zero is a choice, as gravity, is divided by the same excess of the total.
 """
 
 from __future__ import annotations
@@ -64,8 +64,8 @@ def with_relative_excess(
 ) -> pd.DataFrame:
     """Return the rows, and a row of the relative excess of each usable row of the metric.
 
-    Scenes without the reference or skinning have none, nor those in which skinning has no excess. Rows that
-    have relative excesses of the metric already come back as they are.
+    Scenes without the reference or skinning have none, nor those in which skinning has no excess. Rows
+    that have relative excesses of the metric already come back as they are.
 
     Args:
         run: declares the reference and its ensemble, of which members that stalled are left out.
@@ -125,7 +125,8 @@ class Excess:
     Attributes:
         effect: against the reference, from which the verdict comes; its interval is that of `typical`.
         cells: (scene, seed) -> value.
-        pooled: excess energy, the mean over seeds, summed over motions, as a share of skinning's so summed.
+        pooled: excess energy, the mean over seeds, summed over motions, as a share of skinning's so
+            summed.
         fewer: remark on roll-outs that are missing, empty where none is.
     """
 

@@ -2,13 +2,13 @@
 
 The rule looks at an effect (reports.statistics.effects) and, of an answer, at its corrected p-value:
 
-    tie            all of the interval lies within the margin: 5 %, or what the reference's ensemble leaves
-                   uncertain if that is more
+    tie            all of the interval lies within the margin: 5 %, or what the reference's ensemble
+                   leaves uncertain if that is more
     less, more     p is below 0.05, and the difference exceeds the reference's uncertainty
     inconclusive   anything else; fewer than LEAST_MOTIONS motions; a network of one seed
 
-Costs are not tested: their range over motions and seeds lies on one side, within the margin, or on both. A
-time without a range, read from the clock once, is inconclusive.
+Costs are not tested: their range over motions and seeds lies on one side, within the margin, or on both.
+A time without a range, read from the clock once, is inconclusive.
 """
 
 from __future__ import annotations

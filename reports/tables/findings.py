@@ -196,7 +196,9 @@ def unfinished(run: Run) -> list[Table]:
     columns = (SUITE, SCENE, METHOD,
         Column("seed", "Seed", text=True), Column("status", "Status", text=True), REASON)  # fmt: skip
     cells = [(*line[:5], line[5] or "no reason given") for line in lines]
-    return table("unfinished", columns, cells, "Cells that failed or were skipped, with the reason of each.")
+    return table(
+        "unfinished", columns, cells, "Cells that failed or were skipped, with the reason of each."
+    )
 
 
 # Table -> method -> metric -> as printed. A column that the paper does not report is a dash.

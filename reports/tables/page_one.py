@@ -48,7 +48,9 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     scenes = compared_scenes(run, cells)
     timed = cells[cells["scene"].isin(scenes)] if scenes else rows_of_garment
     rows_of_garment = timed if rows_of_garment.empty else rows_of_garment  # of a run of suite speed alone
-    plain = set(rows_of_garment[rows_of_garment["usable"]]["method"]) - run.standing_apart(rows_of_garment)
+    plain = set(rows_of_garment[rows_of_garment["usable"]]["method"]) - run.standing_apart(
+        rows_of_garment
+    )
     chosen = leads(run, rows_of_garment)
     others = [m for m in run.ordered(plain) if run.methods[m].role in ("network", "bound", EXTERNAL)]
     others += [m for m in run.ordered(plain) if run.methods[m].role == "baseline"]
@@ -153,7 +155,8 @@ def reference_uncertainty(run: Run) -> list[Table]:
     rows = frame[frame["scene"].isin(scenes)]
     metrics = [run.metrics[name] for name in (*OF_STEPS, *UNCERTAIN) if name in run.metrics]
     ensemble = [
-        None if metric.name in OF_STEPS else indistinct(run, rows, metric.name) or None for metric in metrics
+        None if metric.name in OF_STEPS else indistinct(run, rows, metric.name) or None
+        for metric in metrics
     ]
     lines: list[tuple[Cell, ...]] = [
         ("ensemble of the reference, root mean square", *[None] * len(scenes), *ensemble)

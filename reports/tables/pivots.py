@@ -95,8 +95,8 @@ SHOWN = (
     "energy/strain", "energy/bending", "energy/gravity", "energy/inertia", "energy/collision", "energy/total",
     "curvature/error", "penetration/vertices", "dynamics/amplitude", "dynamics/correlation", "roll_out/drift",
 )  # fmt: skip
-# A term that is left out of the loss is of course larger; the total is the base's own loss, curvature error
-# (the paper's measure) is nobody's.
+# A term that is left out of the loss is of course larger; the total is the base's own loss, curvature
+# error (the paper's measure) is nobody's.
 COMPARED = ("energy/total", "curvature/error", "penetration/vertices", "roll_out/drift")
 HEAD = (GARMENT, METHOD)
 

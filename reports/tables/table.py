@@ -105,8 +105,8 @@ Cell = float | int | str | Mean | Effect | None
 class Column:
     """A column: its name in the CSV, its title and unit in the PDF, and how it is set there.
 
-    text: words, set from the left; method: names of methods, printed by their labels. digits: of its numbers;
-    trim: without zeros at their end.
+    text: words, set from the left; method: names of methods, printed by their labels. digits: of its
+    numbers; trim: without zeros at their end.
     rounding: size below which a number is rounding error and printed as 0; the CSV keeps it.
     """
 
@@ -126,15 +126,17 @@ class Column:
 
 
 METHOD = Column("method", "Method", text=True, method=True)
-GARMENT, SCENE, SUITE = (Column(name, name.capitalize(), text=True) for name in ("garment", "scene", "suite"))
+GARMENT, SCENE, SUITE = (
+    Column(name, name.capitalize(), text=True) for name in ("garment", "scene", "suite")
+)
 
 
 @dataclass(frozen=True)
 class Table:
     """Columns and rows; each row has one cell per column.
 
-    grouped_by: columns that become headings in the PDF. references: label and texts by column of rows that
-    the paper printed; they are in no CSV.
+    grouped_by: columns that become headings in the PDF. references: label and texts by column of rows
+    that the paper printed; they are in no CSV.
     """
 
     name: str
@@ -148,8 +150,8 @@ class Table:
     def write_csv(self, folder: Path) -> Path:
         """Write <folder>/<name>.csv whole or not at all; return its path.
 
-        A mean gets a column for its spread over seeds and, where there is any, one for its uncertainty and
-        one for the roll-outs that it lacks; an effect gets columns for its kind and its interval.
+        A mean gets a column for its spread over seeds and, where there is any, one for its uncertainty
+        and one for the roll-outs that it lacks; an effect gets columns for its kind and its interval.
         """
         path = folder / f"{self.name}.csv"
         texts: dict[str, list[str]] = {}
@@ -234,7 +236,9 @@ def remarks_below(table: Table, lines: Sequence[Sequence[CellText]]) -> str:
     return " ".join([*remarks, *(REMARKS[mark] for mark in sorted(marks))])
 
 
-def column_texts(run: Run, column: Column, cells: Sequence[Cell], printed: Sequence[str]) -> list[CellText]:
+def column_texts(
+    run: Run, column: Column, cells: Sequence[Cell], printed: Sequence[str]
+) -> list[CellText]:
     """Return text, spread or interval, and marks of a column's cells; `printed`: the paper's rows below."""
     texts = [*(_text(run, column, cell) for cell in cells), *printed]
     lines = []

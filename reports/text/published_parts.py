@@ -9,9 +9,9 @@ Between two comments, the first of which says from what:
 RUN is a folder of reports/published:
 
 front of RUN                                 the answer of README
-table NAME of RUN; COLUMN, ...; METHOD, ...  all where none is named; of `overview` METHODs of several runs
-claims primary of RUN, ...                   or exploratory: judged by the first run that has both methods
-counts of RUN, ...                           how many claims came out how
+table NAME of RUN; COLUMN, ...; METHOD, ...  all where none is named; of `overview` METHODs of several
+runs claims primary of RUN, ...                   or exploratory: judged by the first run that has both
+methods counts of RUN, ...                           how many claims came out how
 runs of RUN, ...                             day, commit and processor
 evaluations of published runs                how often they evaluated test motions
 
@@ -101,8 +101,8 @@ def _words(text: str) -> list[str]:
 def _judged(*folders: Path) -> tuple[dict[Claim, tuple[str, Judged]], dict[str, str], dict[str, str]]:
     """Return claim -> first run that has both of its methods and its judgement; labels; headings of metrics.
 
-    A run that shared its machine with other work judges no claim on times: its methods may have had different
-    shares of the processors.
+    A run that shared its machine with other work judges no claim on times: its methods may have had
+    different shares of the processors.
     """
     verdicts: dict[Claim, tuple[str, Judged]] = {}
     labels: dict[str, str] = {}
@@ -172,7 +172,9 @@ def front_sentences(run: Run) -> str:
     solver = fastest(truncated(run, points), network.error) if network else None
     faster = compare_methods(run, timed, run.metrics[run_time(timed)], run.reference, NETWORK).effect
     if not (snug and pbns and supervised and swing and alike and network and solver and faster):
-        raise ValueError("the run lacks SNUG, PBNS, the supervised network, or their times beside solvers")
+        raise ValueError(
+            "the run lacks SNUG, PBNS, the supervised network, or their times beside solvers"
+        )
     worst, most = snug.worst
     least = min(faster.interval or (faster.shown,))
     power = 10 ** math.floor(math.log10(least))

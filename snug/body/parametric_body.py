@@ -1,9 +1,10 @@
 """Parametric human: template, shape directions, joints and skinning weights, in the layout of SMPL.
 
 Rest pose: T-pose, y up, facing +z, left arm along +x, metres. The body of the package stands with its
-soles on y = 0 and its pelvis above the origin, for every shape, so a motion's translation is zero where it
-stands.
-A posed vertex is the skinned rest vertex plus the translation: joint 0 is at joints(betas)[0] + translation.
+soles on y = 0 and its pelvis above the origin, for every shape, so a motion's translation is zero where
+it stands.
+A posed vertex is the skinned rest vertex plus the translation: joint 0 is at joints(betas)[0] +
+translation.
 """
 
 from collections.abc import Callable
@@ -35,12 +36,12 @@ class Body:
         joint_directions: (24, 3, S) [m], what one unit of each shape coefficient adds to them.
         faces: (F, 3), wound outward.
         parents: (24,), -1 for the root.
-        pose_directions: None, or (B, 3, 9 K) [m]: pose correctives, for one unit of each entry of R - I, row
-            by row, of the rotations R of joints 1 to K relative to their parents.
+        pose_directions: None, or (B, 3, 9 K) [m]: pose correctives, for one unit of each entry of R - I,
+            row by row, of the rotations R of joints 1 to K relative to their parents.
 
     Source:
-        M. Loper et al., SMPL: a skinned multi-person linear model, ACM Transactions on Graphics 34 (2015),
-        equation 9 for the pose correctives.
+        M. Loper et al., SMPL: a skinned multi-person linear model, ACM Transactions on Graphics 34
+        (2015), equation 9 for the pose correctives.
     """
 
     template: NDArray[np.float64]
@@ -107,16 +108,21 @@ class Body:
         """
         return self.poser(betas)(poses, translations)
 
-    def poser(self, betas: ArrayLike | None = None) -> Callable[[ArrayLike, ArrayLike], NDArray[np.float64]]:
+    def poser(
+        self, betas: ArrayLike | None = None
+    ) -> Callable[[ArrayLike, ArrayLike], NDArray[np.float64]]:
         """Return the function `vertices` of one shape, for callers that pose frame after frame.
 
         All that depends on the shape alone is computed once, here. Raises BodyError.
         """
         from scipy.sparse import csr_array  # a body that is not posed needs none
 
-        # sum_j w_ij T_j (p_i, 1) is one product: (w_ij p_ik) over (j, k), mostly zero, times T over (j, k).
+        # sum_j w_ij T_j (p_i, 1) is one product: (w_ij p_ik) over (j, k), mostly zero, times T over (j,
+        # k).
         points = np.concatenate([self.shaped(betas), np.ones((len(self.template), 1))], axis=1)
-        spread = csr_array((self.skinning_weights[:, :, None] * points[:, None, :]).reshape(len(points), -1))
+        spread = csr_array(
+            (self.skinning_weights[:, :, None] * points[:, None, :]).reshape(len(points), -1)
+        )
 
         def pose(poses: ArrayLike, translations: ArrayLike) -> NDArray[np.float64]:
             transforms = self.transforms(poses, translations, betas)

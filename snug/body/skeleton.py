@@ -121,7 +121,10 @@ def sole_points(poses: np.ndarray, translations: np.ndarray) -> np.ndarray:
 
 
 def _positions(
-    rotations: np.ndarray, translations: np.ndarray, rest_joints: np.ndarray, parents: Sequence[int] = PARENTS
+    rotations: np.ndarray,
+    translations: np.ndarray,
+    rest_joints: np.ndarray,
+    parents: Sequence[int] = PARENTS,
 ) -> np.ndarray:
     positions = np.empty((*rotations.shape[:2], 3))
     for joint, parent in enumerate(parents):

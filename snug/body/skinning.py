@@ -1,7 +1,7 @@
 """Linear blend skinning in torch, batched and differentiable.
 
-Rotations follow the SMPL convention: the rotation of a joint is relative to its parent joint, and all frames
-are parallel to the world in the rest pose. Leading axes `...` broadcast.
+Rotations follow the SMPL convention: the rotation of a joint is relative to its parent joint, and all
+frames are parallel to the world in the rest pose. Leading axes `...` broadcast.
 """
 
 from collections.abc import Sequence
@@ -15,10 +15,10 @@ def joint_transforms(
 ) -> Tensor:
     """Return the rigid transforms (..., J, 3, 4) that take points of each joint from rest to the posed body.
 
-    With rotations R_j (..., J, 3, 3) relative to the parent and rest joints p_j (..., J, 3) [m], the world
-    rotation is W_j = W_parent R_j, the posed joint q_j = q_parent + W_parent (p_j - p_parent), and the
-    transform x -> W_j (x - p_j) + q_j. The root is at q_0 = p_0 + translation (..., 3) [m]; its parent is -1,
-    and parents come before their children.
+    With rotations R_j (..., J, 3, 3) relative to the parent and rest joints p_j (..., J, 3) [m], the
+    world rotation is W_j = W_parent R_j, the posed joint q_j = q_parent + W_parent (p_j - p_parent), and
+    the transform x -> W_j (x - p_j) + q_j. The root is at q_0 = p_0 + translation (..., 3) [m]; its
+    parent is -1, and parents come before their children.
     """
     world: list[Tensor] = []
     posed: list[Tensor] = []
@@ -41,8 +41,8 @@ def add_pose_correctives(
 ) -> Tensor:
     """Add the pose correctives of transforms (..., J, 3, 4) to points (..., P, 3) [m] of the rest pose.
 
-    directions: (P, 3, 9 K) [m], see snug.body.parametric_body.Body; the rotations of joints 1 to K relative
-    to their parents are read back from the transforms.
+    directions: (P, 3, 9 K) [m], see snug.body.parametric_body.Body; the rotations of joints 1 to K
+    relative to their parents are read back from the transforms.
     """
     count = directions.shape[2] // 9
     world = transforms[..., :3]
@@ -73,7 +73,9 @@ def unskin(posed: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
     return torch.linalg.solve(blended[..., :3], (posed - blended[..., 3])[..., None])[..., 0]
 
 
-def unskin_damped(posed: Tensor, rest: Tensor, weights: Tensor, transforms: Tensor, damping: float) -> Tensor:
+def unskin_damped(
+    posed: Tensor, rest: Tensor, weights: Tensor, transforms: Tensor, damping: float
+) -> Tensor:
     """Return the offsets o of `rest` that minimise |skin(rest + o) - posed|^2 + damping |o|^2 at each vertex.
 
     Where joints turned far from each other blend to a map that is nearly singular, as in an armpit, what

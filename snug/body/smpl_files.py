@@ -11,9 +11,9 @@
 | shapes, optional, the first ten | `shapedirs`, `shape_directions` | (B, 3, S) |
 | pose correctives, optional | `posedirs` | (B, 3, 9 (J - 1)) |
 
-J: 24 of SMPL, 52 of SMPL-H, 55 of SMPL-X. Of the latter two, fingers go into the hand, jaw and eyes into the
-head, in weights and skeleton; the hand's joint is the mean of its knuckles. The arms are horizontal, since
-motions are relative to the T pose.
+J: 24 of SMPL, 52 of SMPL-H, 55 of SMPL-X. Of the latter two, fingers go into the hand, jaw and eyes into
+the head, in weights and skeleton; the hand's joint is the mean of its knuckles. The arms are horizontal,
+since motions are relative to the T pose.
 """
 
 from __future__ import annotations
@@ -147,7 +147,9 @@ def _skeleton(arrays: Arrays, count: int) -> tuple[np.ndarray, np.ndarray, np.nd
     for joint in range(BODY_JOINTS, joints):
         if (parent := int(parents[joint])) in FOLDED:
             folded[joint, FOLDED[parent]] = 1.0
-            places[FOLDED[parent], joint] = parent != FOLDED[parent]  # knuckles; the head stays where it is
+            places[FOLDED[parent], joint] = (
+                parent != FOLDED[parent]
+            )  # knuckles; the head stays where it is
         else:
             folded[joint] = folded[parent]
     knuckles = places.sum(axis=1, keepdims=True)

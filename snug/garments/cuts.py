@@ -100,7 +100,8 @@ def armhole_cut(
 ) -> CutPlane:
     """Return a plane from a strap's width [m] beside the neck to under the arm.
 
-    It leans outwards so far that the flanks stay, with the ease and flare that build_surface adds to them.
+    It leans outwards so far that the flanks stay, with the ease and flare that build_surface adds to
+    them.
     """
     shoulder, skin = joint_position(body, "left_shoulder"), body.template
     arm = skin[skin_following(body, ("left_shoulder",))]

@@ -20,7 +20,8 @@ from snug.body.skeleton import JOINT_NAMES
 from snug.garments.implicit_surface import joint_position, skin_following
 
 SHAPE_SMOOTHING = 10  # rounds over a shape's displacement: nearest vertices jump from leg to leg
-# Rounds over the weights at 1000 vertices of cloth that spans both thighs: between them it follows neither.
+# Rounds over the weights at 1000 vertices of cloth that spans both thighs: between them it follows
+# neither.
 SKIRT_SMOOTHING = 60
 
 
@@ -37,12 +38,13 @@ class Garment:
         rest_positions: (V,3) [m].
         faces: (F,3), outward.
         body_vertices: (V,), the nearest body vertex among those it may follow.
-        skinning_weights: (V,24), those of that vertex, smoothed where cloth hangs between the legs; rows sum
-            to one.
-        loops: name ("neck", "left_sleeve", "right_sleeve", "left_armhole", "right_armhole", "hem", "waist",
-            "left_leg", "right_leg") -> boundary vertices in order along the faces' winding, front-most first.
-        pins: (P,), ascending: vertices that the body carries, of a waistband, since contact without friction
-            does not hold it.
+        skinning_weights: (V,24), those of that vertex, smoothed where cloth hangs between the legs; rows
+            sum to one.
+        loops: name ("neck", "left_sleeve", "right_sleeve", "left_armhole", "right_armhole", "hem",
+            "waist", "left_leg", "right_leg") -> boundary vertices in order along the faces' winding,
+            front-most first.
+        pins: (P,), ascending: vertices that the body carries, of a waistband, since contact without
+            friction does not hold it.
         parameters: of the tailoring.
         material: of the cloth.
         rest_uv: (F,3,2) [m] of the faces' corners, the flat rest state of a garment that has one; else
@@ -66,7 +68,11 @@ class Garment:
         Raises MeshError for a mesh that cannot be simulated.
         """
         return Cloth(
-            self.rest_positions, self.faces, material or self.material, pins=self.pins, rest_uv=self.rest_uv
+            self.rest_positions,
+            self.faces,
+            material or self.material,
+            pins=self.pins,
+            rest_uv=self.rest_uv,
         )
 
     @property
@@ -126,9 +132,9 @@ BELOW_HIPS = 0.1  # [m] below the hip joints, from where one tube around both le
 def find_weights(body: Body, positions: Array, faces: Index, *, legs: bool) -> tuple[Array, Index]:
     """Return skinning weights (V,24) of a garment on the unposed body, and its nearest vertices (V,).
 
-    They are blended from the three corners of the closest face of the skin, among the limbs that the garment
-    encloses. One tube around both legs, where neither leg has its own opening (`legs`), is smoothed below the
-    hips as a skirt is.
+    They are blended from the three corners of the closest face of the skin, among the limbs that the
+    garment encloses. One tube around both legs, where neither leg has its own opening (`legs`), is
+    smoothed below the hips as a skirt is.
     """
     followed = skin_following(body, enclosed_limbs(body, positions, faces))
     skin = np.asarray(body.faces)[followed[body.faces].all(axis=1)]
@@ -163,8 +169,12 @@ def enclosed_limbs(body: Body, positions: Array, faces: Index) -> tuple[str, ...
 
 
 ARMHOLE = 0.2  # share of the upper arm, beyond which an opening is a sleeve
-OPEN_SEAM = 0.05  # of the mean boundary edge: between boundary vertices that no edge joins, a seam left open
-MIDDLE = 0.5  # share of a hip joint's distance from the middle, beyond which an opening is a sleeve or a leg
+OPEN_SEAM = (
+    0.05  # of the mean boundary edge: between boundary vertices that no edge joins, a seam left open
+)
+MIDDLE = (
+    0.5  # share of a hip joint's distance from the middle, beyond which an opening is a sleeve or a leg
+)
 ORDER = ("neck", "waist", "left_sleeve", "right_sleeve", "left_armhole", "right_armhole", "left_leg",
          "right_leg", "hem")  # fmt: skip
 
@@ -172,11 +182,11 @@ ORDER = ("neck", "waist", "left_sleeve", "right_sleeve", "left_armhole", "right_
 def name_openings(body: Body, positions: Array, faces: Index) -> dict[str, Index]:
     """Return the boundary vertices of each opening by its name, along the winding, front-most first.
 
-    The garment (V,3) [m], (F,3) lies on the unposed body. An opening beside the middle is a sleeve above the
-    hips, or far out, and a leg else; a sleeve that ends near the shoulder's joint is an armhole. In the
-    middle the highest is the neck, above half the way from pelvis to neck, or else the waist, and the lowest
-    the hem; one that is alone there is the hem, unless there are legs. The lowest of all is called hem too
-    where no other is, but for two legs. Others are opening_1 and so on.
+    The garment (V,3) [m], (F,3) lies on the unposed body. An opening beside the middle is a sleeve above
+    the hips, or far out, and a leg else; a sleeve that ends near the shoulder's joint is an armhole. In
+    the middle the highest is the neck, above half the way from pelvis to neck, or else the waist, and the
+    lowest the hem; one that is alone there is the hem, unless there are legs. The lowest of all is called
+    hem too where no other is, but for two legs. Others are opening_1 and so on.
 
     Raises:
         ValueError: loops touch.

@@ -1,19 +1,19 @@
 """Implicit surface that a garment is cut from: a smooth solid around the body, as a signed field on a grid.
 
-A shirt that followed the skin would be pressed into the waist and between the legs, where cloth never goes.
-So the solid is a union of three solids, each grown by its own distance:
+A shirt that followed the skin would be pressed into the waist and between the legs, where cloth never
+goes. So the solid is a union of three solids, each grown by its own distance:
 
 - the body itself, by `clearance` (this shapes shoulders and neck);
 - the torso, one convex section per height, which below the armpits never narrows again on the way down:
   cloth hangs from its widest support; a flare widens it further, from the waist to the hem;
 - the upper arm, one convex section per distance from the shoulder.
 
-A skirt is the same without sleeves, hanging from its waistband and widening from the hips on. For trousers
-the torso ends at the crotch and a leg begins, one convex section per height.
+A skirt is the same without sleeves, hanging from its waistband and widening from the hips on. For
+trousers the torso ends at the crotch and a leg begins, one convex section per height.
 
 Convex sections grown by d have 2 pi d more girth (Steiner's formula), so ease of girth e is a growth of
-e/(2 pi); it sets in between armpit and waist, and between shoulder and cuff. Only the half x >= 0 is built;
-the other half is its mirror image, so the garment is exactly symmetric.
+e/(2 pi); it sets in between armpit and waist, and between shoulder and cuff. Only the half x >= 0 is
+built; the other half is its mirror image, so the garment is exactly symmetric.
 """
 
 from __future__ import annotations
@@ -29,7 +29,16 @@ from reference_sim.geometry.topology import Array, Index, edge_uses
 from snug.body.parametric_body import Body
 from snug.body.skeleton import JOINT
 
-TORSO_BONES = ("pelvis", "left_hip", "right_hip", "spine1", "spine2", "spine3", "left_collar", "right_collar")
+TORSO_BONES = (
+    "pelvis",
+    "left_hip",
+    "right_hip",
+    "spine1",
+    "spine2",
+    "spine3",
+    "left_collar",
+    "right_collar",
+)
 # Joints whose weights a shirt may borrow: never hands, head or shins, even where they come near.
 SHIRT_BONES = (*TORSO_BONES, "left_shoulder", "right_shoulder")
 ARM_BONES = ("left_shoulder", "left_elbow")
@@ -135,7 +144,9 @@ class _Sections:
 
     def support(self, edges: Index, axis: int) -> Array:
         """Return the support function (L,K) of the sections of edges (E,2) at each node of an axis."""
-        return _fill_levels(_section_support(self.body.template, edges, self.nodes[axis], axis, self.normals))
+        return _fill_levels(
+            _section_support(self.body.template, edges, self.nodes[axis], axis, self.normals)
+        )
 
     def field(self, support: Array, growth: Array, axis: int) -> Array:
         """Return the distance (nx,ny,nz) to sections `support` (L,K) grown by `growth` (L,)."""
@@ -154,7 +165,9 @@ def _torso(sections: _Sections, edges: Index, hang: float, growth: Array, narrow
     y = sections.nodes[1]
     support = sections.support(edges, 1)
     mirrored = (SUPPORT_DIRECTIONS // 2 - np.arange(SUPPORT_DIRECTIONS)) % SUPPORT_DIRECTIONS
-    support = np.maximum(support, support[:, mirrored])  # both sides of a body that is not quite symmetric
+    support = np.maximum(
+        support, support[:, mirrored]
+    )  # both sides of a body that is not quite symmetric
     below = np.flatnonzero(y <= hang)
     fall = narrowing * y[below, None]
     support[below] = np.maximum.accumulate((support[below] - fall)[::-1], axis=0)[::-1] + fall
@@ -213,8 +226,8 @@ def build_surface(
 ) -> ImplicitSurface:  # fmt: skip
     """Build the surface of a garment between the heights hem and top [m].
 
-    Ease, clearance and flare [m] are those of `GarmentTemplate.tailor`. Sleeves end at x = cuff [m]. With a
-    waistband it hangs from the hips instead of the shoulders, with legs it is a pair of trousers.
+    Ease, clearance and flare [m] are those of `GarmentTemplate.tailor`. Sleeves end at x = cuff [m]. With
+    a waistband it hangs from the hips instead of the shoulders, with legs it is a pair of trousers.
     """
     import igl  # not loaded where garments are only named
 
@@ -251,8 +264,8 @@ def build_surface(
     values = np.minimum(hanging, distance - clearance)  # a blend would add girth wherever both agree
     ghost = 3
     values = np.pad(values, ((ghost, 0), (0, 0), (0, 0)), mode="reflect")
-    # Rounds the creases where one solid meets another. Once alone would move a surface of radius r inward by
-    # sigma^2/(2 r); twice minus twice over cancels that.
+    # Rounds the creases where one solid meets another. Once alone would move a surface of radius r inward
+    # by sigma^2/(2 r); twice minus twice over cancels that.
     soft = ndimage.gaussian_filter(values, 1.0)
     values = 2 * soft - ndimage.gaussian_filter(soft, 1.0)
     origin = low - [ghost * GRID_SPACING, 0, 0]

@@ -1,8 +1,8 @@
 """Mesh of a garment from its surface and cuts: half remeshed, kept off the body, mirrored at the seam.
 
-pyacvd's clusters give the number of vertices that was asked for, but a ragged rim. So rim vertices are spread
-evenly along the cut lines of the dense sheet, and the inner ones move towards a weighted mean of the
-triangles around them, kept on the surface, between Delaunay flips.
+pyacvd's clusters give the number of vertices that was asked for, but a ragged rim. So rim vertices are
+spread evenly along the cut lines of the dense sheet, and the inner ones move towards a weighted mean of
+the triangles around them, kept on the surface, between Delaunay flips.
 """
 
 from __future__ import annotations
@@ -27,8 +27,9 @@ from snug.body.parametric_body import Body
 from snug.garments.cuts import SEAM, CutPlane, cut_sheet, outlines
 from snug.garments.implicit_surface import SHIRT_BONES, ImplicitSurface, skin_following
 
-# Triangles pull with their area to this power. Power 1 (Lloyd's iteration) left areas of 0.45 to 2.0 of the
-# mean at 2000 to 8000 vertices, power 3 leaves 0.52 to 1.9; it needs the short step, a full one oscillates.
+# Triangles pull with their area to this power. Power 1 (Lloyd's iteration) left areas of 0.45 to 2.0 of
+# the mean at 2000 to 8000 vertices, power 3 leaves 0.52 to 1.9; it needs the short step, a full one
+# oscillates.
 EVENNESS = 3
 RELAXATION_STEP = 0.2
 RELAXATIONS = 40  # rounds of relax
@@ -156,7 +157,8 @@ def remesh(
 ) -> tuple[Array, Index]:
     """Remesh a dense sheet (N,3) [m], (M,3) evenly, with about `count` vertices that stay on the surface.
 
-    outlines: of each boundary loop its curves (P,3) end to end along the winding; one curve alone is closed.
+    outlines: of each boundary loop its curves (P,3) end to end along the winding; one curve alone is
+    closed.
 
     Raises:
         ValueError: the clusters are too coarse to keep the sheet's topology.
@@ -188,7 +190,9 @@ def mesh_garment(
     sheet, sheet_faces = cut_sheet(surface, cuts)
     curves = outlines(sheet, sheet_faces, cuts)
     names = sorted(name for loop in curves for name, _ in loop)
-    expected = [cut.name for cut in cuts]  # the seam runs down front and back; of trousers the two are one
+    expected = [
+        cut.name for cut in cuts
+    ]  # the seam runs down front and back; of trousers the two are one
     if names not in (sorted([SEAM, *expected]), sorted(expected)) or [SEAM] in [
         [n for n, _ in c] for c in curves
     ]:
@@ -196,7 +200,8 @@ def mesh_garment(
     rims = [[curve for _, curve in loop] for loop in curves]
     # An opening that the seam does not meet has a twin on the other side.
     openings = sum(2 if len(loop) == 1 else sum(name != SEAM for name, _ in loop) for loop in curves)
-    # V = 2 half - seam, and only the mesh tells how many vertices its seam has; some sizes come out unsound.
+    # V = 2 half - seam, and only the mesh tells how many vertices its seam has; some sizes come out
+    # unsound.
     half, tried, problem = vertices // 2 + int(0.57 * np.sqrt(vertices)), set[int](), ""
     while len(tried) < 16:
         while half in tried:
@@ -242,7 +247,9 @@ def _keep_off(body: Body, points: Array, faces: Index, cuts: list[CutPlane], cle
     for _ in range(30):
         corners = points[faces]
         middles = 0.5 * (corners + np.roll(corners, 1, axis=1))
-        samples = np.concatenate([corners, middles, corners.mean(axis=1, keepdims=True)], axis=1)  # (F,7,3)
+        samples = np.concatenate(
+            [corners, middles, corners.mean(axis=1, keepdims=True)], axis=1
+        )  # (F,7,3)
         squared, nearest, closest = tree.squared_distance(skin, skin_faces, samples.reshape(-1, 3))
         away = samples.reshape(-1, 3) - closest
         side = np.sign(np.sum(away * outward[nearest], axis=1))  # a chord may run inside of the body

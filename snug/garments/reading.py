@@ -101,9 +101,12 @@ def _make_garment(file: GarmentFile, body: Body, raw: Surface, material: Materia
         raise ValueError("it has no opening, the surface is closed: cut where head and limbs come out")
     legs = "left_leg" in loops or "right_leg" in loops
     weights, nearest = find_weights(body, positions, faces, legs=legs)
-    # A garment without neck and sleeves hangs from its waist, and contact without friction does not hold it.
+    # A garment without neck and sleeves hangs from its waist, and contact without friction does not hold
+    # it.
     hangs = any(name in loops for name in ("neck", "left_sleeve", "right_sleeve"))
-    pins = np.empty(0, dtype=np.int64) if hangs else np.sort(loops.get("waist", np.empty(0, dtype=np.int64)))
+    pins = (
+        np.empty(0, dtype=np.int64) if hangs else np.sort(loops.get("waist", np.empty(0, dtype=np.int64)))
+    )
     return Garment(
         name=file.name,
         rest_positions=positions,

@@ -69,13 +69,13 @@ class GarmentTemplate:
             body: that wears it.
             vertices: number of vertices, met within 1 %.
             measures: in place of defaults, of those that the kind has:
-                ease: girth [m] beyond a garment that lies at `clearance`: of a shirt or dress at the waist
-                and cuffs, of a skirt at the hips, of trousers and shorts at hips and legs;
+                ease: girth [m] beyond a garment that lies at `clearance`: of a shirt or dress at the
+                waist and cuffs, of a skirt at the hips, of trousers and shorts at hips and legs;
                 clearance: least distance [m] from the skin, over vertices, edge midpoints and centroids;
                 sleeve: covered share of the upper arm, or of the whole arm for long sleeves;
                 strap: width of the straps [m]; rise: waistband above the hip joints [m];
-                length: hem below the hip joints [m]; of trousers and shorts the inseam, as a share of that
-                from crotch to ankle;
+                length: hem below the hip joints [m]; of trousers and shorts the inseam, as a share of
+                that from crotch to ankle;
                 flare: how much further [m] the hem stands off than the waist, or a skirt's than the hips.
 
         Raises:
@@ -207,4 +207,6 @@ def find_template(name: str) -> GarmentTemplate:
     for template in GARMENT_TEMPLATES:
         if template.name == name:
             return template
-    raise GarmentError(f"unknown garment {name!r}: use one of {', '.join(p.name for p in GARMENT_TEMPLATES)}")
+    raise GarmentError(
+        f"unknown garment {name!r}: use one of {', '.join(p.name for p in GARMENT_TEMPLATES)}"
+    )

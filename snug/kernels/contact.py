@@ -1,9 +1,10 @@
 """Kernels of the contact cache: normals of the skin, energy of all samples, walk of their anchors.
 
 An anchor moves as a bead on the skin would: to the foot of its sample on the anchor's face and, where the
-foot is outside, over a side that it is outside of onto the next face, until a foot is inside or a side or a
-corner is closest. Where the skin is one smooth sheet that is the closest point. What it cannot find is skin
-of another limb, a thigh that comes up through the hem: that takes a search (snug.training.contact_cache).
+foot is outside, over a side that it is outside of onto the next face, until a foot is inside or a side or
+a corner is closest. Where the skin is one smooth sheet that is the closest point. What it cannot find is
+skin of another limb, a thigh that comes up through the hem: that takes a search
+(snug.training.contact_cache).
 """
 
 from __future__ import annotations
@@ -49,8 +50,8 @@ def walk_to_foot(
     """Return the face, and weights of its second and third corner, where an anchor rests for a sample at x.
 
     It starts on `face` of the body: skin (B, 3) [m] and faces (Q, 3). It enters no face whose centroid at
-    rest is farther than the root of `reach` [m^2] from homes (S, 3), the samples at rest. corners (1, 3, 3)
-    is room to work in.
+    rest is farther than the root of `reach` [m^2] from homes (S, 3), the samples at rest. corners (1, 3,
+    3) is room to work in.
     """
     last, zero, one = face, np.float32(0.0), np.float32(1.0)
     for _ in range(CROSSINGS):
@@ -59,7 +60,11 @@ def walk_to_foot(
         s0, s1, s2 = skin[j, 0] - o0, skin[j, 1] - o1, skin[j, 2] - o2
         t0, t1, t2 = skin[k, 0] - o0, skin[k, 1] - o1, skin[k, 2] - o2
         r0, r1, r2 = x0 - o0, x1 - o1, x2 - o2
-        ss, tt, st = (s0 * s0 + s1 * s1 + s2 * s2, t0 * t0 + t1 * t1 + t2 * t2, s0 * t0 + s1 * t1 + s2 * t2)
+        ss, tt, st = (
+            s0 * s0 + s1 * s1 + s2 * s2,
+            t0 * t0 + t1 * t1 + t2 * t2,
+            s0 * t0 + s1 * t1 + s2 * t2,
+        )
         sr, tr = s0 * r0 + s1 * r1 + s2 * r2, t0 * r0 + t1 * r1 + t2 * r2
         determinant = ss * tt - st * st
         v, w = (tt * sr - st * tr) / determinant, (ss * tr - st * sr) / determinant
@@ -121,7 +126,11 @@ def byte_normals(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
             for n in range(L):
                 x, y, z = u[n], u[L + n], u[2 * L + n]
                 factor = np.float32(127.0) / (np.sqrt(x * x + y * y + z * z) + np.float32(1e-30))
-                u[n], u[L + n], u[2 * L + n] = np.rint(factor * x), np.rint(factor * y), np.rint(factor * z)
+                u[n], u[L + n], u[2 * L + n] = (
+                    np.rint(factor * x),
+                    np.rint(factor * y),
+                    np.rint(factor * z),
+                )
             for n in range(3 * L):
                 rounded[n] = u[n]
             for n in range(present):
@@ -166,8 +175,8 @@ def contact_energy(
     """Sum k max(margin - d, 0)^power over samples into values (C, TRAINING_LANES); add gradients like x.
 
     x (C, V, 3, TRAINING_LANES); frames, rows (N, T). stencils, faces: uint32, for a signed index is first
-    tested whether it counts from the end. Most samples are out of reach, and for them the loads cost most:
-    all that they read of a frame is first laid together.
+    tested whether it counts from the end. Most samples are out of reach, and for them the loads cost
+    most: all that they read of a frame is first laid together.
     """
     # Normals have 127 times unit length, within 0.9 by rounding.
     reach = np.float32(128.0) * (margin + slack if walk else margin)

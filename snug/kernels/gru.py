@@ -5,10 +5,10 @@ For each layer, with gates r, z, candidate n and q = W_hn h + b_hn (torch.nn.GRU
     r = s(W_ir x + b_ir + W_hr h + b_hr)     z = s(W_iz x + b_iz + W_hz h + b_hz)
     n = tanh(W_in x + b_in + r q)            h' = (1 - z) n + z h
 
-Three things make it faster than torch.nn.GRU under autograd: products of one sort are taken for all frames
-together, weight gradients above all; what stands between them is one kernel; and forward products go to
-oneDNN where torch has it, which on a CPU with AVX-512 that is not Intel's is twice as fast as MKL. The
-weights stay those of the modules.
+Three things make it faster than torch.nn.GRU under autograd: products of one sort are taken for all
+frames together, weight gradients above all; what stands between them is one kernel; and forward products
+go to oneDNN where torch has it, which on a CPU with AVX-512 that is not Intel's is twice as fast as MKL.
+The weights stay those of the modules.
 """
 
 from __future__ import annotations
@@ -45,8 +45,8 @@ _MKL_IS_SLOW = get_host_cpu_name().startswith("znver")  # AMD's, where it makes 
 def product(a: Tensor, b: Tensor, bias: Tensor | None = None) -> Tensor:
     """Return a (n, k) times the transpose of b (m, k), plus bias (m,), (n, m) in float32 on a CPU.
 
-    oneDNN first lays out anew a b that is itself a transpose, as in every backward product: where MKL is as
-    fast, those are its.
+    oneDNN first lays out anew a b that is itself a transpose, as in every backward product: where MKL is
+    as fast, those are its.
     """
     if _LINEAR is not None and (_MKL_IS_SLOW or b.is_contiguous()):
         return _LINEAR(a, b, bias, "none", [], "")
@@ -56,9 +56,10 @@ def product(a: Tensor, b: Tensor, bias: Tensor | None = None) -> Tensor:
 class FastGRU(torch.autograd.Function):
     """apply(x (N, T, D), state (L, N, H), *weights) -> (N, T, H), (L, N, H).
 
-    weights: input, hidden, input bias, hidden bias of each layer. Differentiable once, by the weights alone:
-    neither inputs nor the state at the start are trained, and the state that comes out is a constant. Between
-    products a row of units is as wide as the next multiple of TRAINING_LANES, and 0 beyond H.
+    weights: input, hidden, input bias, hidden bias of each layer. Differentiable once, by the weights
+    alone: neither inputs nor the state at the start are trained, and the state that comes out is a
+    constant. Between products a row of units is as wide as the next multiple of TRAINING_LANES, and 0
+    beyond H.
     """
 
     @staticmethod

@@ -1,7 +1,7 @@
 """Network and skinning of one frame as one compiled call, laid out by snug.networks.frame_layout.
 
-A frame alone is one pass over all weights, matrix after matrix: its time is that of fetching them. So each
-matrix lies in one piece, in the order of use, float32.
+A frame alone is one pass over all weights, matrix after matrix: its time is that of fetching them. So
+each matrix lies in one piece, in the order of use, float32.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ import numpy as np
 
 from reference_sim.kernels.kernel_cache import njit
 
-# Kinds of operations: y = W x + b, y += that, its positive part, and that times its sigmoid (SiLU); a cell;
-# squared distances of x from the rows of W; the mean of the rows of W that have the least distances; offsets
-# of a block of vertices by one handle, and those added; y += x.
+# Kinds of operations: y = W x + b, y += that, its positive part, and that times its sigmoid (SiLU); a
+# cell; squared distances of x from the rows of W; the mean of the rows of W that have the least
+# distances; offsets of a block of vertices by one handle, and those added; y += x.
 PRODUCT, ADDED, RECTIFIED, SMOOTH, CELL, DISTANCES, NEAREST, HANDLE, HANDLE_ADDED, SUM = range(10)
 ROWS, COLUMNS = 4, 32  # a matrix has multiples of these: rows at once, and numbers in vector registers
 VERTEX_BLOCK = 64  # vertices that are skinned together
@@ -37,13 +37,15 @@ def skin_frame(
 ) -> None:
     """Write world vertices into out (V, 3) [m], float64, by linear blend skinning.
 
-    offsets (3 V',) and rest (3, V'), the unposed garment [m]: in this order (V,) of vertices and with others
-    behind them, in blocks of VERTEX_BLOCK; joints[first[b]:first[b + 1]] move block b, with shares
+    offsets (3 V',) and rest (3, V'), the unposed garment [m]: in this order (V,) of vertices and with
+    others behind them, in blocks of VERTEX_BLOCK; joints[first[b]:first[b + 1]] move block b, with shares
     (., VERTEX_BLOCK).
     transforms (J, 3, 4), pelvis (3,) [m], float64; all other real numbers are float32.
     """
     count, padded = len(order), rest.shape[1]
-    u = np.empty(6 * VERTEX_BLOCK, np.float32)  # points and their images: nothing overlaps in one small array
+    u = np.empty(
+        6 * VERTEX_BLOCK, np.float32
+    )  # points and their images: nothing overlaps in one small array
     for b in range(len(first) - 1):
         for c in range(3):
             for i in range(VERTEX_BLOCK):
@@ -82,12 +84,12 @@ def run_frame(
     """Write world vertices into out (V, 3) [m], float64, and the next state into work.
 
     operations (n, 7): kind, rows, columns, and where its weights, terms, what it reads and what it writes
-    begin in `weights`, `terms` and `work`, which are flat; of a cell rows is its size and columns where its
-    recurrent part begins; of SUM rows is its size; of NEAREST the terms are the number of rows that share,
-    what is added to each distance, and a factor; of HANDLE rows is how far apart two coordinates of a vertex
-    are written, and columns how far apart their numbers are read. terms: mean and spread of the features
-    (D,), which are normalised into work[:D], then factors and biases of each matrix. The offsets are the last
-    of `work`. The others are those of skin_frame.
+    begin in `weights`, `terms` and `work`, which are flat; of a cell rows is its size and columns where
+    its recurrent part begins; of SUM rows is its size; of NEAREST the terms are the number of rows that
+    share, what is added to each distance, and a factor; of HANDLE rows is how far apart two coordinates
+    of a vertex are written, and columns how far apart their numbers are read. terms: mean and spread of
+    the features (D,), which are normalised into work[:D], then factors and biases of each matrix. The
+    offsets are the last of `work`. The others are those of skin_frame.
     """
     inputs = len(features)
     for i in range(inputs):
@@ -114,7 +116,13 @@ def run_frame(
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
 def _multiply(
-    kind: int, weights: np.ndarray, terms: np.ndarray, x: np.ndarray, y: np.ndarray, rows: int, columns: int
+    kind: int,
+    weights: np.ndarray,
+    terms: np.ndarray,
+    x: np.ndarray,
+    y: np.ndarray,
+    rows: int,
+    columns: int,
 ) -> None:
     """Multiply four rows at once, a quarter of the matrix apart: four streams of memory are faster."""
     part = rows // ROWS

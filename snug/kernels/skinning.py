@@ -1,13 +1,15 @@
 """Skinning of many frames of one garment in closed form, for training on a CPU, and their layout in memory.
 
-Few joints move a vertex, so each adds its share alone; blending the transforms of all joints takes ten times
-as long. tests/snug/body/test_skinning.py compares values and gradients with `snug.body.skinning.skin`.
+Few joints move a vertex, so each adds its share alone; blending the transforms of all joints takes ten
+times as long. tests/snug/body/test_skinning.py compares values and gradients with
+`snug.body.skinning.skin`.
 
-The loops run over frames that lie side by side. Vertices (N, T, V, 3) of N windows of T frames lie in memory
-as C blocks of TRAINING_LANES frames, (C, V, 3, TRAINING_LANES): the first frames of all windows, then the
-second ones, and so on. Skinning writes this layout and the kernels of the energies and of contact take it as
-it is. For TRAINING_LANES windows, as training has, the tensor is a view of it, for most other numbers a copy.
-Its shape is (N, T, V, 3) in any case, so terms without a kernel work on it too.
+The loops run over frames that lie side by side. Vertices (N, T, V, 3) of N windows of T frames lie in
+memory as C blocks of TRAINING_LANES frames, (C, V, 3, TRAINING_LANES): the first frames of all windows,
+then the second ones, and so on. Skinning writes this layout and the kernels of the energies and of
+contact take it as it is. For TRAINING_LANES windows, as training has, the tensor is a view of it, for
+most other numbers a copy. Its shape is (N, T, V, 3) in any case, so terms without a kernel work on it
+too.
 """
 
 from __future__ import annotations
@@ -47,7 +49,8 @@ def from_lanes(lanes: np.ndarray, windows: int, frames: int) -> Tensor:
 class FastSkin(torch.autograd.Function):
     """apply(points (N, T, V, 3) [m], weights (V, J), transforms (N, T, J, 3, 4)) -> (N, T, V, 3) [m].
 
-    In float32, differentiable once, by the points alone, which lie in memory as FastLinear lays its results.
+    In float32, differentiable once, by the points alone, which lie in memory as FastLinear lays its
+    results.
     """
 
     @staticmethod
@@ -73,7 +76,8 @@ class FastSkin(torch.autograd.Function):
         return columns.unflatten(2, (frames, windows)).permute(3, 2, 0, 1), None, None
 
 
-# The point is copied into one small array of known size, for the compiler then knows that nothing overlaps.
+# The point is copied into one small array of known size, for the compiler then knows that nothing
+# overlaps.
 @njit(cache=True, fastmath={"contract"}, error_model="numpy")
 def _posed(points: np.ndarray, weights: np.ndarray, entries: np.ndarray, out: np.ndarray) -> None:
     """Pose flat points (V, 3, C, L) by weights (V, J), entries (C, J, 12 L) into flat out (C, V, 3, L)."""

@@ -1,8 +1,8 @@
 """Acclaim motion capture: a skeleton (.asf) and its clips (.amc), as the CMU database has them.
 
 Format: J. Lander, Working with motion capture file formats, Game Developer, January 1998. A bone's angles
-are given in its own axes C (columns in the world of the zero pose), so with M the product of its rotations
-the bone turns, relative to its parent and seen from the zero pose, by C M C^-1, and
+are given in its own axes C (columns in the world of the zero pose), so with M the product of its
+rotations the bone turns, relative to its parent and seen from the zero pose, by C M C^-1, and
 G_bone = G_parent C M C^-1 is its rotation in the world. Its far end lies at G_bone direction length.
 """
 
@@ -24,7 +24,8 @@ from snug.motion.retarget import FEET, HINGES, LIMBS, retarget
 CMU_RATE = 120.0  # [1/s] the .amc format has no field for it
 INCH = 0.0254  # [m]
 ROTATIONS, TRANSLATIONS = ("rx", "ry", "rz"), ("tx", "ty", "tz")
-# Our joint: the CMU bone whose turn it takes. Thumbs and the half bones inside hips and neck are not needed.
+# Our joint: the CMU bone whose turn it takes. Thumbs and the half bones inside hips and neck are not
+# needed.
 JOINT_BONES = {
     "pelvis": "root", "spine1": "lowerback", "spine2": "upperback", "spine3": "thorax",
     "neck": "upperneck", "head": "head",

@@ -1,8 +1,8 @@
 """Biovision motion capture (.bvh): a hierarchy of joints with offsets, and a line of channels per frame.
 
 Format: M. Meredith and S. Maddock, Motion capture file formats explained, University of Sheffield, 2001.
-The channels of a joint are applied to a column vector from the last to the first. With all of them zero the
-joints stand at the sums of their offsets: the zero pose.
+The channels of a joint are applied to a column vector from the last to the first. With all of them zero
+the joints stand at the sums of their offsets: the zero pose.
 """
 
 from __future__ import annotations
@@ -20,7 +20,9 @@ from snug.motion.motion import Motion, MotionError
 from snug.motion.recording import finite_numbers, frame_rate, parse_lines
 from snug.motion.retarget import FEET, LIMBS, match_joints, retarget, way_up
 
-CHANNELS = {f"{axis}{kind}".lower(): f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ"}
+CHANNELS = {
+    f"{axis}{kind}".lower(): f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ"
+}
 
 
 @dataclass

@@ -1,8 +1,9 @@
 """Motions made by code, by name: actions on the spot, gaits, and stops within one frame.
 
 Actions are tables of key angles (actions.toml, where the columns are explained), gaits follow published
-normative joint-angle curves. Twists and turning walks end within one frame, as no body can: they set a wide
-hem swinging and let it ring, so that the cloth moves by itself and its motion cannot be told from the pose.
+normative joint-angle curves. Twists and turning walks end within one frame, as no body can: they set a
+wide hem swinging and let it ring, so that the cloth moves by itself and its motion cannot be told from
+the pose.
 """
 
 from __future__ import annotations
@@ -84,7 +85,8 @@ class Stride:
 # Approximate values of the mean curves of D. A. Winter, The Biomechanics and Motor Control of Human Gait
 # (University of Waterloo Press), natural cadence: 105 steps per minute. Ankle dorsiflexion is positive.
 # Pelvis: Perry, Gait Analysis (1992), 5 degrees of rotation, 4 of obliquity. Arms: Murray et al.,
-# Patterns of sagittal rotation of the upper limbs in walking, Physical Therapy 47 (1967), about 32 degrees.
+# Patterns of sagittal rotation of the upper limbs in walking, Physical Therapy 47 (1967), about 32
+# degrees.
 WALK = Stride(
     seconds=1.14,
     hip=((0, 21), (10, 17), (20, 9), (30, 0), (40, -7), (50, -11), (60, -6), (70, 8), (80, 18), (90, 22)),
@@ -97,7 +99,8 @@ WALK = Stride(
 )  # fmt: skip
 
 # Approximate values of the curves for running in T. F. Novacheck, The biomechanics of running,
-# Gait and Posture 7 (1998), about 3.2 m/s, and of the arm swing he describes: elbows held near 90 degrees.
+# Gait and Posture 7 (1998), about 3.2 m/s, and of the arm swing he describes: elbows held near 90
+# degrees.
 RUN = Stride(
     seconds=0.72,
     hip=((0, 38), (10, 34), (20, 19), (30, 4), (38, -5), (46, -4), (56, 16), (66, 42), (76, 56), (86, 53),
@@ -109,8 +112,8 @@ RUN = Stride(
     arm_mean=-5.0, arm_swing=34.0, elbow_mean=80.0, elbow_swing=15.0, trunk_lean=5.0,
 )  # fmt: skip
 
-# Approximate values of the mean curves of R. Riener, M. Rabuffetti and C. Frigo, Stair ascent and descent at
-# different inclinations, Gait and Posture 15 (2002), at their middle inclination.
+# Approximate values of the mean curves of R. Riener, M. Rabuffetti and C. Frigo, Stair ascent and descent
+# at different inclinations, Gait and Posture 15 (2002), at their middle inclination.
 CLIMB = Stride(
     seconds=1.42,
     hip=((0, 52), (10, 46), (20, 36), (30, 24), (40, 14), (50, 7), (60, 9), (70, 30), (80, 53), (90, 60)),
@@ -246,7 +249,10 @@ def twist(degrees: float, hertz: float, hips: float, stop: float) -> Frames:
     time = np.minimum(time, round(stop * LIBRARY_FPS) / LIBRARY_FPS)
     yaw = degrees * np.sin(2 * np.pi * hertz * time) * smoothstep(time / ONSET)
     poses = poses_from_angles(STANCE, len(time))
-    for name, share in (("pelvis", hips), *((name, share * (1.0 - hips)) for name, share in SPINE_SHARES)):
+    for name, share in (
+        ("pelvis", hips),
+        *((name, share * (1.0 - hips)) for name, share in SPINE_SHARES),
+    ):
         turn = Rotation.from_euler("y", (share * yaw)[:, None], degrees=True).as_matrix()
         poses[:, JOINT[name]] = axis_angles(turn @ rotation_matrices(poses[:, JOINT[name]]))
     translations = np.zeros((len(time), 3))

@@ -1,7 +1,7 @@
 """Motions from files of motion capture, ready to use: checked, y up, resampled, arms spread.
 
-Arrays of SMPL's joints, axis-angle relative to the parent joint, are read by their names from .npz in AMASS's
-layout and from pickled dicts. SMPL, SMPL+H and SMPL-X begin with the same 22 joints.
+Arrays of SMPL's joints, axis-angle relative to the parent joint, are read by their names from .npz in
+AMASS's layout and from pickled dicts. SMPL, SMPL+H and SMPL-X begin with the same 22 joints.
 Only SMPL's own two hand joints are the ones of our tree; the others carry fingers there, which a garment
 never meets. Shape coefficients and soft tissue are left out: shape is the caller's choice.
 
@@ -97,7 +97,9 @@ def _triples(arrays: Mapping[str, np.ndarray], name: str, frames: int = 0) -> np
     if frames and shape not in ((frames, 3), (frames, 1, 3)):
         raise MotionError(f"'{name}' has shape {shape}; give ({frames}, 3), a row for each pose")
     if not (shape[2:] == (3,) or (len(shape) == 2 and shape[1] % 3 == 0)):
-        raise MotionError(f"'{name}' has shape {shape}; give (frames, 3 joints) or (frames, joints, 3) [rad]")
+        raise MotionError(
+            f"'{name}' has shape {shape}; give (frames, 3 joints) or (frames, joints, 3) [rad]"
+        )
     return array.reshape(len(array), -1, 3)
 
 
@@ -121,9 +123,10 @@ SHAPE_FILES = ("shape.npz", "*_stagei.npz")  # of a subject: AMASS keeps them be
 def load_motions(path: str | Path, *, options: MotionFileOptions | None = None) -> list[Motion]:
     """Read motions from a file, or from every motion file of a folder, in the order of their names.
 
-    Each comes back whole, at 30 frames per second, placed on the floor at the origin facing +z, with the arms
-    spread by `clear_arms` and the hands' rotations at a tenth. CMU files (.amc) need their skeleton (.asf)
-    beside them. Of a folder, a subject's shape as AMASS keeps it beside the clips (SHAPE_FILES) is left out.
+    Each comes back whole, at 30 frames per second, placed on the floor at the origin facing +z, with the
+    arms spread by `clear_arms` and the hands' rotations at a tenth. CMU files (.amc) need their skeleton
+    (.asf) beside them. Of a folder, a subject's shape as AMASS keeps it beside the clips (SHAPE_FILES) is
+    left out.
 
     Raises:
         MotionError: one line with file, element and remedy, for anything that cannot be read.
@@ -144,7 +147,9 @@ def load_motions(path: str | Path, *, options: MotionFileOptions | None = None) 
         listed = sorted(file for file in path.iterdir() if file.suffix.lower() in READERS)
         files = [f for f in listed if not any(fnmatch(f.name, shape) for shape in SHAPE_FILES)]
     if not files:
-        raise MotionError(f"{path}: holds no motion file ({known}); give a folder of motion capture clips")
+        raise MotionError(
+            f"{path}: holds no motion file ({known}); give a folder of motion capture clips"
+        )
     options = options or MotionFileOptions()
     return [clear_arms(resample(place(read_motion(file, options)))) for file in files]
 

@@ -14,7 +14,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from snug.motion.motion import Motion, MotionError, heading, nearest_pose, spread_arms, turn_about_vertical
+from snug.motion.motion import (
+    Motion,
+    MotionError,
+    heading,
+    nearest_pose,
+    spread_arms,
+    turn_about_vertical,
+)
 
 CLIPS_FILE = Path(__file__).with_name("recorded") / "clips.npz"
 
@@ -82,8 +89,8 @@ VALIDATION: tuple[str, ...] = (
     "sudden_stop", "05_02_a", "06_02_a", "kick", "07_08", "spin_jump", "punch", "05_02_b",
     "05_02_c", "06_02_b",
 )  # fmt: skip
-# Nobody chooses by them. Preset quick measures the first eight. Sword play and shots at a basket are kinds of
-# which TRAIN and VALIDATION have none, motions made by code are a kind of which TRAIN has none.
+# Nobody chooses by them. Preset quick measures the first eight. Sword play and shots at a basket are
+# kinds of which TRAIN and VALIDATION have none, motions made by code are a kind of which TRAIN has none.
 TEST: tuple[str, ...] = (
     "01_01_a", "push_recovery", "02_07_a", "dance_turn", "06_15", "05_03", "cartwheel_lean", "07_02",
     "climbing_steps", "sit_and_stand", "06_14",
@@ -130,7 +137,9 @@ def make_motion(name: str) -> Motion:
 
 def _read_clip(name: str) -> Motion:
     with np.load(CLIPS_FILE) as file:  # reads what is asked for
-        poses, translations, source = (file[f"{name}/{part}"] for part in ("poses", "translations", "source"))
+        poses, translations, source = (
+            file[f"{name}/{part}"] for part in ("poses", "translations", "source")
+        )
     source = f"CMU motion capture: {source}"
     return Motion(name, poses, translations, kind=CLIPS[name].content, source=source)
 

@@ -60,11 +60,15 @@ class Motion:
         translations = np.ascontiguousarray(self.translations, dtype=np.float64)
         frames, shapes = len(poses), (poses.shape, translations.shape)
         if not frames or shapes != ((frames, 24, 3), (frames, 3)):
-            raise MotionError(f"motion {self.name}: arrays {shapes}; give (frames, 24, 3) and (frames, 3)")
+            raise MotionError(
+                f"motion {self.name}: arrays {shapes}; give (frames, 24, 3) and (frames, 3)"
+            )
         finite = np.isfinite(poses).all(axis=(1, 2)) & np.isfinite(translations).all(axis=1)
         if not finite.all():
             wrong = f"{np.count_nonzero(~finite)} frames, from frame {finite.argmin()} on"
-            raise MotionError(f"motion {self.name}: numbers are not finite in {wrong}; cut the clip there")
+            raise MotionError(
+                f"motion {self.name}: numbers are not finite in {wrong}; cut the clip there"
+            )
         if not (np.isfinite(self.fps) and self.fps > 0):
             raise MotionError(f"motion {self.name}: {self.fps} frames per second; give a positive rate")
         object.__setattr__(self, "poses", poses)
@@ -114,8 +118,8 @@ def spread_arms(motion: Motion, degrees: float = 20.0) -> Motion:
 def clear_arms(motion: Motion) -> Motion:
     """Spread the arms by 20 degrees, or in steps of 5 up to 40 until they are clear of the torso.
 
-    Clear: every upper arm at least ARMS_CLEAR from the spine's direction in 95 % of the frames. A clip whose
-    arms stay nearer says so in its source.
+    Clear: every upper arm at least ARMS_CLEAR from the spine's direction in 95 % of the frames. A clip
+    whose arms stay nearer says so in its source.
     """
     for degrees in (20.0, 25.0, 30.0, 35.0, 40.0):
         spread = spread_arms(motion, degrees)
@@ -130,9 +134,9 @@ def clear_arms(motion: Motion) -> Motion:
 def resample(motion: Motion, fps: float = 30.0) -> Motion:
     """Return the motion at another frame rate: rotations along the shortest arc, translations linearly.
 
-    First and last pose stay. Where the rates do not divide, the clip is stretched by at most half a new frame
-    in all, so that frames stay evenly spaced at exactly `fps` (the simulator's time step is fixed). A clip of
-    less than one new frame is stretched to one.
+    First and last pose stay. Where the rates do not divide, the clip is stretched by at most half a new
+    frame in all, so that frames stay evenly spaced at exactly `fps` (the simulator's time step is fixed).
+    A clip of less than one new frame is stretched to one.
     """
     if motion.frames == 1 or fps == motion.fps:
         return replace(motion, fps=fps)
@@ -167,8 +171,8 @@ def smoothstep(s: np.ndarray) -> np.ndarray:
 def place(motion: Motion) -> Motion:
     """Move a clip so that it starts above the origin, facing +z, with its feet on the floor y = 0.
 
-    The whole clip is turned and shifted rigidly. Recorded floors are seldom at zero, so the second percentile
-    of the lower foot's height over all frames is taken for the floor.
+    The whole clip is turned and shifted rigidly. Recorded floors are seldom at zero, so the second
+    percentile of the lower foot's height over all frames is taken for the floor.
     """
     placed = turn_about_vertical(motion, -heading(motion.poses[0]))
     poses, translations = placed.poses, placed.translations
@@ -209,8 +213,8 @@ def mirror_motion(motion: Motion) -> Motion:
 def nearest_pose(poses: np.ndarray, others: np.ndarray) -> np.ndarray:
     """Return how far each pose (T, 24, 3) is from the nearest of the others (N, 24, 3): (T,) [rad].
 
-    The mean over the body's joints, hands aside, of the geodesic angle between their rotations. For the root
-    it is the angle between the two upward directions: which way a body faces is no difference.
+    The mean over the body's joints, hands aside, of the geodesic angle between their rotations. For the
+    root it is the angle between the two upward directions: which way a body faces is no difference.
     """
     up, turns = _up_and_turns(poses)
     other_up, other_turns = _up_and_turns(others)

@@ -23,7 +23,9 @@ CENTRAL = {
     "pelvis_pitch": 0.0, "pelvis_roll": 0.0, "pelvis_yaw": 0.0, "trunk_flexion": 0.0, "trunk_bend": 0.0,
     "trunk_twist": 0.0, "head_pitch": 0.0, "head_yaw": 0.0,
 }  # fmt: skip
-STANDING = CENTRAL | {f"{side}_{name}": value for side in ("left", "right") for name, value in SIDED.items()}
+STANDING = CENTRAL | {
+    f"{side}_{name}": value for side in ("left", "right") for name, value in SIDED.items()
+}
 
 # Share of trunk flexion, bending and twist that each spine joint takes: the chest twists most.
 SPINE_SHARES = (("spine1", 0.3), ("spine2", 0.3), ("spine3", 0.4))
@@ -83,15 +85,16 @@ def root_path(
 ) -> np.ndarray:
     """Return root translations (T, 3) [m] of poses (T, 24, 3) at RATE whose standing foot stays in place.
 
-    Height: the lowest sole point is on the floor; in a flight the pelvis follows the parabola of free fall
-    between its heights at take-off and landing. Forward and sideways: the sole points that carry the body do
-    not move over the floor; in a flight the speed goes over from one to the other. Gaussians smooth both.
+    Height: the lowest sole point is on the floor; in a flight the pelvis follows the parabola of free
+    fall between its heights at take-off and landing. Forward and sideways: the sole points that carry the
+    body do not move over the floor; in a flight the speed goes over from one to the other. Gaussians
+    smooth both.
 
     Args:
         poses: (T, 24, 3) [rad] at RATE.
         flights: (start, end) [s] of each.
-        support: (T, 2) shares in [0, 1] of the left and right foot where they are known (a swinging foot may
-            come as low as the standing one); else the lowest points carry.
+        support: (T, 2) shares in [0, 1] of the left and right foot where they are known (a swinging foot
+            may come as low as the standing one); else the lowest points carry.
         height_smoothing: [s].
         speed_smoothing: [s].
         rises: the floor is steps: the height, too, is such that the carrying points stay.
@@ -111,7 +114,9 @@ def root_path(
     for start, end in flights:
         inside = (time > start) & (time < end)
         fall = 0.5 * FREE_FALL * (time - start) * (end - time)
-        height[inside] = (np.interp(time, (start, end), np.interp((start, end), time, height)) + fall)[inside]
+        height[inside] = (np.interp(time, (start, end), np.interp((start, end), time, height)) + fall)[
+            inside
+        ]
         for axis in (0, 1):
             ends = np.interp((start, end), time, velocity[:, axis])
             velocity[inside, axis] = np.interp(time[inside], (start, end), ends)

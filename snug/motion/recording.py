@@ -24,7 +24,9 @@ MAX_SECONDS = 1800.0  # [s] a clip of few frames per second becomes many at 30
 LOWEST_RATE, HIGHEST_RATE = 5.0, 1000.0  # [1/s] rates of frames that a recording may have
 
 
-def parse_lines(path: Path, parse: Callable[[Iterator[list[str]]], Content], comment: str = "\0") -> Content:
+def parse_lines(
+    path: Path, parse: Callable[[Iterator[list[str]]], Content], comment: str = "\0"
+) -> Content:
     """Return what `parse` makes of the lines of a text file, each a list of words.
 
     Lines without a word are left out, and what follows the letter `comment`.
@@ -56,7 +58,9 @@ def finite_numbers(words: Sequence[str], count: int) -> list[float]:
     return values
 
 
-def frame_rate(frames: int, stated: float | None, given: float | None, usual: float | None = None) -> float:
+def frame_rate(
+    frames: int, stated: float | None, given: float | None, usual: float | None = None
+) -> float:
     """Return the frames per second [1/s]: of the file, else of the options, else `usual` for such files.
 
     Raises:
@@ -109,20 +113,22 @@ def check_recording(motion: Motion) -> None:
 
 # From the axes of a file, by the one that is vertical, to ours: with z up (x, y, z) becomes (x, z, -y).
 TO_Y_UP = {"y": np.eye(3), "z": np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])}
-MAX_LYING_COSINE = 0.3  # between the vertical and the way from ankles to head: below it a body lies or crawls
+MAX_LYING_COSINE = (
+    0.3  # between the vertical and the way from ankles to head: below it a body lies or crawls
+)
 MAX_RISE = 1.0  # [m] the lowest joint may rise and fall where no axis is given: more than a jump
 
 
 def turn_y_up(motion: Motion, up: str) -> Motion:
     """Turn a motion in the axes of its file so that y is up.
 
-    In a frame the body stands along the axis that is nearest to the direction from its ankles to its head.
-    The axis of more than half of the frames is taken; a body that lies in the others, as after a fall, is
-    fine. A given axis `up`, "y" or "z", is taken if the body stands along it.
+    In a frame the body stands along the axis that is nearest to the direction from its ankles to its
+    head. The axis of more than half of the frames is taken; a body that lies in the others, as after a
+    fall, is fine. A given axis `up`, "y" or "z", is taken if the body stands along it.
 
     Raises:
-        MotionError: no axis is that, the given one is not, or a body that should stand along the axis found
-            travels along it: it may be crawling.
+        MotionError: no axis is that, the given one is not, or a body that should stand along the axis
+            found travels along it: it may be crawling.
     """
     joints = joint_positions(motion.poses, motion.translations)
     ankles = joints[:, [JOINT["left_ankle"], JOINT["right_ankle"]]].mean(axis=1)

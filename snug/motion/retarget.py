@@ -1,12 +1,13 @@
 """Put the motion of a foreign skeleton on ours: joints matched by name, every limb points where theirs does.
 
 Our joint j turns in the world by G_j = G_b A_j. Theirs turns by G_b from the zero pose, and A_j turns our
-resting limb t_j into theirs there, d_b: its far end then points along G_b A_j t_j = G_b d_b. How a limb is
-twisted about itself follows from its hinge where the file has one. Else A_j is the smallest turn, and the
-zero pose must be a T or A pose.
+resting limb t_j into theirs there, d_b: its far end then points along G_b A_j t_j = G_b d_b. How a limb
+is twisted about itself follows from its hinge where the file has one. Else A_j is the smallest turn, and
+the zero pose must be a T or A pose.
 
-Joints are matched with ours by common names: limbs by name; pelvis, spine and neck by place. The pelvis is
-where the legs meet, the spine leads from there to where the arms meet, and the neck from there to the head.
+Joints are matched with ours by common names: limbs by name; pelvis, spine and neck by place. The pelvis
+is where the legs meet, the spine leads from there to where the arms meet, and the neck from there to the
+head.
 """
 
 from __future__ import annotations
@@ -28,7 +29,12 @@ LIMBS = {
 }
 FEET = {"left_ankle": "left_foot", "right_ankle": "right_foot"}
 # Axis about which a hinge bends in our rest pose. The limb above a hinge is aligned by the same axis.
-HINGES = {"left_knee": (1, 0, 0), "right_knee": (1, 0, 0), "left_elbow": (0, -1, 0), "right_elbow": (0, 1, 0)}
+HINGES = {
+    "left_knee": (1, 0, 0),
+    "right_knee": (1, 0, 0),
+    "left_elbow": (0, -1, 0),
+    "right_elbow": (0, 1, 0),
+}
 # Largest turn from our rest pose to a zero pose without hinges: legs astride, arms down.
 ASTRIDE, ARMS_DOWN = np.deg2rad(60.0), np.deg2rad(95.0)
 
@@ -64,8 +70,8 @@ def _alignment(
 ) -> np.ndarray:
     """Return A (3, 3) of one joint.
 
-    Feet turn about the vertical only, since both skeletons stand flat in their rest poses. Spine, head and
-    collars have no limb to align: upright is upright.
+    Feet turn about the vertical only, since both skeletons stand flat in their rest poses. Spine, head
+    and collars have no limb to align: upright is upright.
     """
     side, _, part = name.partition("_")
     if part in ("wrist", "hand"):
@@ -107,8 +113,8 @@ def _frame(along: np.ndarray, hinge: np.ndarray) -> np.ndarray:
 # Joints of a side, from the trunk outwards; those of NEEDED a skeleton must have.
 LIMB_CHAINS = (("hip", "knee", "ankle", "foot"), ("collar", "shoulder", "elbow", "wrist", "hand"))
 NEEDED = ("hip", "knee", "ankle", "shoulder", "elbow", "wrist")
-# What common skeletons call them: after joints (ours, Biovision), or after bones (Mixamo, CMU's clips as BVH,
-# Unity, Unreal, 3ds Max, Daz). Arms and legs are each named in the style that fits best.
+# What common skeletons call them: after joints (ours, Biovision), or after bones (Mixamo, CMU's clips as
+# BVH, Unity, Unreal, 3ds Max, Daz). Arms and legs are each named in the style that fits best.
 STYLES: tuple[dict[str, tuple[str, ...]], ...] = (
     {joint: (joint,) for limb in LIMB_CHAINS for joint in limb}
     | {"ankle": ("ankle", "foot"), "foot": ("toe", "toes", "foot"), "wrist": ("wrist", "hand")},

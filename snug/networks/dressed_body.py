@@ -1,7 +1,7 @@
 """A body and the garment it wears, as tensors a network works on: inputs, joint transforms, skinned vertices.
 
-Everything a network or its loss sees is relative to the pelvis (the posed joint 0) of its own frame, where
-float32 keeps its digits and the energy of gravity is zero. The pelvis is added in float64.
+Everything a network or its loss sees is relative to the pelvis (the posed joint 0) of its own frame,
+where float32 keeps its digits and the energy of gravity is zero. The pelvis is added in float64.
 """
 
 from __future__ import annotations
@@ -25,8 +25,8 @@ FEATURE_SETS = {"motion": 1, "pose": 0, "pose_shape": 0, "joint_motion": 2}
 class DressedBody:
     """A garment on a body; every motion is given to the methods.
 
-    The rest state of all energies is the garment's, for every body shape: the same shirt on a larger body is
-    a stretched shirt.
+    The rest state of all energies is the garment's, for every body shape: the same shirt on a larger body
+    is a stretched shirt.
     """
 
     def __init__(self, body: Body, garment: Garment) -> None:
@@ -40,15 +40,17 @@ class DressedBody:
     def weights(self, smoothing: int) -> Tensor:
         """Return skinning weights (V, 24), borrowed from the body and averaged over neighbours.
 
-        smoothing: sweeps at 1000 vertices. A sweep reaches as far as an edge is long, so that other garments
-        get sweeps in proportion to their vertices, and are smoothed over the same length.
+        smoothing: sweeps at 1000 vertices. A sweep reaches as far as an edge is long, so that other
+        garments get sweeps in proportion to their vertices, and are smoothed over the same length.
         """
         if smoothing not in self._weights:
             borrowed = weights = np.asarray(self.garment.skinning_weights)
             if smoothing:
                 sweeps = max(1, round(smoothing * self.vertices / 1000))
                 weights = smooth_weights(weights, self.garment.faces, sweeps)
-                weights[self.garment.pins] = borrowed[self.garment.pins]  # where the simulator's handles are
+                weights[self.garment.pins] = borrowed[
+                    self.garment.pins
+                ]  # where the simulator's handles are
             self._weights[smoothing] = torch.as_tensor(np.asarray(weights), dtype=torch.float32)
         return self._weights[smoothing]
 
@@ -68,7 +70,9 @@ class DressedBody:
         if self._rest_directions is None:
             # The garment follows the body linearly, so one call for each direction tells all shapes.
             units = np.eye(self.body.shape_count)
-            moved = [self.garment.rest_for(self.body, unit) - self.garment.rest_positions for unit in units]
+            moved = [
+                self.garment.rest_for(self.body, unit) - self.garment.rest_positions for unit in units
+            ]
             self._rest_directions = torch.as_tensor(np.stack(moved), dtype=torch.float32)
         return self._rest_directions
 
@@ -96,12 +100,14 @@ class DressedBody:
         """Return the inputs (T, D) of a network, float32; `still`: as if each pose were held.
 
         Sets are `pose`; `motion`: pose, root velocity and shape; `pose_shape`: pose and shape, with zeros
-        behind it up to SHAPES numbers; `joint_motion`: pose and rates of single joints (snug.networks.ncs).
-        The recipe gives the form of the pose and the axes of the velocity.
+        behind it up to SHAPES numbers; `joint_motion`: pose and rates of single joints
+        (snug.networks.ncs). The recipe gives the form of the pose and the axes of the velocity.
         """
         if feature_set == "joint_motion":
             pose, rates = joint_motion(self.body, motion, betas)
-            return torch.from_numpy(np.concatenate([pose, rates * (not still)], axis=1).astype(np.float32))
+            return torch.from_numpy(
+                np.concatenate([pose, rates * (not still)], axis=1).astype(np.float32)
+            )
         rotations = rotation_matrices(motion.poses)
         parts = [_pose_numbers(motion.poses, rotations, recipe.pose_input)]
         if feature_set == "motion":

@@ -1,11 +1,12 @@
 """Learners without training steps: the nearest training poses, and ridge regression on principal components.
 
-    nearest poses:  offsets(theta) = sum_k w_k offsets_k,  w_k ~ 1 / |r(theta) - r_k|^2, of the K nearest r_k
-    regression:     offsets(theta) = mean + D W (r(theta) - mean),  D: principal components of the offsets
+    nearest poses:  offsets(theta) = sum_k w_k offsets_k,  w_k ~ 1 / |r(theta) - r_k|^2, of the K nearest
+    r_k regression:     offsets(theta) = mean + D W (r(theta) - mean),  D: principal components of the
+    offsets
 
-Both learn offsets of the unposed garment from simulated frames in one go; a network has to do better from the
-same frames. r are the numbers of a pose (DressedBody.features): for the first up in the root's axes and two
-columns of each joint's rotation as they are, so that |r - r_k| is a distance of rotations.
+Both learn offsets of the unposed garment from simulated frames in one go; a network has to do better from
+the same frames. r are the numbers of a pose (DressedBody.features): for the first up in the root's axes
+and two columns of each joint's rotation as they are, so that |r - r_k| is a distance of rotations.
 """
 
 from __future__ import annotations
@@ -44,7 +45,8 @@ class NearestPoses(GarmentNetwork):
         """Make room for as many frames as there are, then load."""
         count = len(state_dict[f"{prefix}poses"])
         self._keep(
-            self.poses.new_zeros(count, self.poses.shape[1]), self.frames.new_zeros(count, 3 * self.vertices)
+            self.poses.new_zeros(count, self.poses.shape[1]),
+            self.frames.new_zeros(count, 3 * self.vertices),
         )
         super()._load_from_state_dict(state_dict, prefix, *rest)
 
@@ -90,7 +92,9 @@ class PoseRegression(PoseSpaceDeformation):
         x_mean = features.double().mean(0)
         x = features.double() - x_mean
         penalty = ridge * len(x) * torch.eye(x.shape[1], dtype=x.dtype)
-        weights = torch.linalg.lstsq(x.T @ x + penalty, x.T @ coefficients, driver="gelsd").solution  # (D, K)
+        weights = torch.linalg.lstsq(
+            x.T @ x + penalty, x.T @ coefficients, driver="gelsd"
+        ).solution  # (D, K)
         first = cast(nn.Linear, self.activations[0])
         with torch.no_grad():
             for parameter in self.parameters():

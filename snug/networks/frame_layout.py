@@ -147,7 +147,14 @@ class FramePlan:
         return slice(start, start + size)
 
     def _product(
-        self, kind: int, matrix: np.ndarray, bias: np.ndarray, x: slice, target: int, *, scale: float = 1.0
+        self,
+        kind: int,
+        matrix: np.ndarray,
+        bias: np.ndarray,
+        x: slice,
+        target: int,
+        *,
+        scale: float = 1.0,
     ) -> None:
         rows, columns = matrix.shape
         more = _up(rows, ROWS) - rows
@@ -155,7 +162,10 @@ class FramePlan:
         first = sum(map(len, self._matrices)), sum(map(len, self._terms))
         self._operations.append((kind, *matrix.shape, *first, x.start, target))
         self._matrices.append(matrix.ravel())
-        self._terms += [np.full(len(matrix), scale, np.float32), np.float32(scale) * np.pad(bias, (0, more))]
+        self._terms += [
+            np.full(len(matrix), scale, np.float32),
+            np.float32(scale) * np.pad(bias, (0, more)),
+        ]
 
 
 def _numbers_of(layer: nn.Linear) -> tuple[np.ndarray, np.ndarray]:

@@ -29,19 +29,20 @@ if TYPE_CHECKING:
 class GarmentNetwork(nn.Module):
     """A map from features (N, T, D) and a state to offsets (N, T, V, 3) [m] and the next state.
 
-    The features are normalised inside, by the mean and spread of the training frames, which are saved with
-    the weights: a caller passes plain features and cannot forget it.
+    The features are normalised inside, by the mean and spread of the training frames, which are saved
+    with the weights: a caller passes plain features and cannot forget it.
 
     Attributes:
         feature_set: inputs it reads, one of snug.networks.dressed_body.FEATURE_SETS.
         sequential: whether it carries a state from frame to frame.
-        lead: frames before a training window that it reads first, from a state of zero, with their gradient.
+        lead: frames before a training window that it reads first, from a state of zero, with their
+            gradient.
         closed_form: whether it trains by snug.kernels.gru, on a CPU; its next state then has no gradient.
         pins: vertices without offset, which the body carries; see `make_network`.
         output_scale: factor on the predicted offsets.
         offsets: last layer; a network without one overrides `last_layers`.
-        gru: recurrent units, whose state (layers, N, hidden) is the network's; a `sequential` network without
-            them overrides `random_state`.
+        gru: recurrent units, whose state (layers, N, hidden) is the network's; a `sequential` network
+            without them overrides `random_state`.
     """
 
     feature_set: ClassVar[str]
@@ -124,7 +125,9 @@ class GarmentNetwork(nn.Module):
 def perceptron(*widths: int, bias: bool = True, activation: type[nn.Module] = nn.ReLU) -> nn.Sequential:
     """Return linear layers of these widths, the first those of the inputs, each with an activation."""
     sizes = pairwise(widths)
-    return nn.Sequential(*(layer for a, b in sizes for layer in (nn.Linear(a, b, bias=bias), activation())))
+    return nn.Sequential(
+        *(layer for a, b in sizes for layer in (nn.Linear(a, b, bias=bias), activation()))
+    )
 
 
 _GENERATOR = threading.Lock()  # torch's generator is one for all threads
@@ -148,11 +151,11 @@ def seeded(seed: int) -> Iterator[None]:
 def initialise(network: nn.Module, rules: str) -> None:
     """Give a network's linear layers and gated recurrent units the weights that they start from.
 
-    Torch's rules are those by which its layers are made: uniform within 1 / sqrt(inputs), biases too, where a
-    recurrent layer takes its units for inputs. Keras' rules: input weights uniform within
+    Torch's rules are those by which its layers are made: uniform within 1 / sqrt(inputs), biases too,
+    where a recurrent layer takes its units for inputs. Keras' rules: input weights uniform within
     sqrt(6 / (inputs + outputs)) (Glorot and Bengio 2010), where a recurrent layer of H units counts 3 H
-    outputs, one for each of its gates; recurrent weights (3H, H) with orthonormal columns; biases zero. They
-    are drawn from torch's global generator. rules: one of snug.recipe.INITIALISATIONS.
+    outputs, one for each of its gates; recurrent weights (3H, H) with orthonormal columns; biases zero.
+    They are drawn from torch's global generator. rules: one of snug.recipe.INITIALISATIONS.
     """
     if rules == "torch":
         return
@@ -173,7 +176,8 @@ def make_network(
 ) -> GarmentNetwork:
     """Make a network at its start; the same seed gives the same weights, whatever was drawn before.
 
-    It maps features (N, T, D = inputs) to offsets (N, T, V, 3) [m], none at the pins, which the body carries.
+    It maps features (N, T, D = inputs) to offsets (N, T, V, 3) [m], none at the pins, which the body
+    carries.
     Raises ValueError for an unknown kind.
 
     Example:

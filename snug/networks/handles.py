@@ -3,15 +3,16 @@
     offsets(theta)_v = sum_b w_b(v) A_b(theta) [(r_v - c_b) / h; 1]        (shape_functions)
 
 A small network gives the twelve numbers of each A_b: a perceptron that sees one pose, as PBNS does, or
-recurrent units that see the motion and their own past, as SNUG's do. So it has a tenth of SNUG's weights, and
-what it can express is the span of the shape functions (method `handles-80-floor`), whatever it has learned.
+recurrent units that see the motion and their own past, as SNUG's do. So it has a tenth of SNUG's weights,
+and what it can express is the span of the shape functions (method `handles-80-floor`), whatever it has
+learned.
 
-The offsets are of the unposed garment r, as SNUG's, so that it is skinned. The centres c are farthest points
-of the garment, each the vertex that lies farthest from those before it. The weights are compact, w_b ~ (1 -
-d_b/R)^4 (4 d_b/R + 1) for distances d_b < R (Wendland 1995), and sum to one in each vertex, so that equal
-transforms of all handles move the garment affinely. h is the covering radius, the largest distance of a
-vertex from its nearest centre; R = REACH h. Distances are straight: those along edges leave more of the
-energy above the minimum (docs/notebook/training.md).
+The offsets are of the unposed garment r, as SNUG's, so that it is skinned. The centres c are farthest
+points of the garment, each the vertex that lies farthest from those before it. The weights are compact,
+w_b ~ (1 - d_b/R)^4 (4 d_b/R + 1) for distances d_b < R (Wendland 1995), and sum to one in each vertex, so
+that equal transforms of all handles move the garment affinely. h is the covering radius, the largest
+distance of a vertex from its nearest centre; R = REACH h. Distances are straight: those along edges leave
+more of the energy above the minimum (docs/notebook/training.md).
 """
 
 from __future__ import annotations
@@ -76,7 +77,8 @@ def compact_weights(distances: np.ndarray, reach: float) -> np.ndarray:
 def span(functions: np.ndarray) -> np.ndarray:
     """Return a basis (3 V, 12 B) of the offsets that shape functions (V, B, 4) express.
 
-    Its columns belong to numbers in the order (3, B, 4): each function along x, then along y, then along z.
+    Its columns belong to numbers in the order (3, B, 4): each function along x, then along y, then along
+    z.
     """
     flat = functions.reshape(len(functions), -1)
     return np.einsum("vk,ij->vijk", flat, np.eye(3, dtype=flat.dtype)).reshape(3 * len(flat), -1)

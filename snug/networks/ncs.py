@@ -2,17 +2,18 @@
 
     offsets_t = D(z_s + z_d),   z_s = static encoder(pose_t),   z_d = GRU(dynamic encoder(motion_1..t))
 
-Nothing in the dynamic branch has a bias, and the motion of a body at rest is zero: where nothing has moved,
-z_d is zero and the garment is D(z_s). So the branches are apart by their form, without a loss of their own.
-In training a fifth of a batch has codes z_d of other windows (motion augmentation).
+Nothing in the dynamic branch has a bias, and the motion of a body at rest is zero: where nothing has
+moved, z_d is zero and the garment is D(z_s). So the branches are apart by their form, without a loss of
+their own. In training a fifth of a batch has codes z_d of other windows (motion augmentation).
 
 The inputs are of the joints near a garment:
 
     pose of a joint:    two columns of its rotation R, and the direction of gravity in its axes
     motion of a joint:  rates of both, and the acceleration of its position in its axes
 
-A body that stands still has a motion of zero. The pelvis differs from the authors' inputs: its rotation is
-left out of the pose, and the rate of it is taken in its own axes, so that it does not matter where north is.
+A body that stands still has a motion of zero. The pelvis differs from the authors' inputs: its rotation
+is left out of the pose, and the rate of it is taken in its own axes, so that it does not matter where
+north is.
 """
 
 from __future__ import annotations
@@ -29,7 +30,8 @@ from snug.motion.motion import Motion
 from snug.networks.frame_layout import FramePlan
 from snug.networks.garment_network import GarmentNetwork, perceptron
 
-# Those of the published configuration for SMPL: what carries clothes, without shanks, feet, hands and head.
+# Those of the published configuration for SMPL: what carries clothes, without shanks, feet, hands and
+# head.
 DESCRIBED = (
     "pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "spine3", "neck",
     "left_collar", "right_collar", "left_shoulder", "right_shoulder", "left_elbow", "right_elbow",
@@ -77,7 +79,9 @@ STATIC_WIDTHS = (64, 128, 256, 512)
 JOINT_WIDTHS = (32, 32)  # of layers that all joints share
 WIDTH = 512  # of the codes, of the other layers of the dynamic branch, and of the decoder
 DECODER_LAYERS = 3
-LEAD = 13  # frames: with a window of three the recurrent units see 16, half a second of rates at 30 a second
+LEAD = (
+    13  # frames: with a window of three the recurrent units see 16, half a second of rates at 30 a second
+)
 EXCHANGED = 0.2  # share of a batch
 JUDGED_BY_INERTIA = 2  # first frame of a window that has inertia
 
@@ -147,15 +151,17 @@ class TwoBranches(StaticBranch):
     def forward(self, features: Tensor, state: Tensor | None = None) -> tuple[Tensor, Tensor]:
         """Return offsets (N, T, V, 3) [m] and the state after the last frame.
 
-        In training the first windows have codes z_d of each other. Their frames from the third on, which have
-        inertia, have no gradient; nor has their past where it is detached (Recipe.inertia_form).
+        In training the first windows have codes z_d of each other. Their frames from the third on, which
+        have inertia, have no gradient; nor has their past where it is detached (Recipe.inertia_form).
         """
         static = self.static_code(features)
         dynamic, after = self.dynamic_code(features, state)
         count = round(EXCHANGED * len(features)) if self.training else 0
         if count < 2:
             return self.decode(static + dynamic), after
-        strange = static[:count].detach() + dynamic[:count].detach().roll(1, 0)  # windows are drawn at random
+        strange = static[:count].detach() + dynamic[:count].detach().roll(
+            1, 0
+        )  # windows are drawn at random
         offsets = self.decode(torch.cat([strange, static[count:] + dynamic[count:]]))
         early, late = offsets[:count].tensor_split([JUDGED_BY_INERTIA], dim=1)
         return torch.cat([torch.cat([early, late.detach()], 1), offsets[count:]]), after

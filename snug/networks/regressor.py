@@ -2,8 +2,9 @@
 
     M(beta, phi) = W(T + R(beta, phi), J(beta), theta, W_G)                      (paper, eq. 1 and 2)
 
-Four gated recurrent units of 256 with tanh and one linear layer to 3V offsets (paper, section 3.5). The state
-at the start is zero at run time; in training N(0, sigma) is added to it, sigma being a recipe's choice.
+Four gated recurrent units of 256 with tanh and one linear layer to 3V offsets (paper, section 3.5). The
+state at the start is zero at run time; in training N(0, sigma) is added to it, sigma being a recipe's
+choice.
 """
 
 from __future__ import annotations

@@ -43,16 +43,16 @@ def roll_out(
 ) -> Trajectory:
     """Compute the garment's positions in each frame of a motion.
 
-    The state starts at zero and is carried from frame to frame. Inputs and joint transforms are ready before
-    the first frame, so that the frames' times are those of network and skinning.
+    The state starts at zero and is carried from frame to frame. Inputs and joint transforms are ready
+    before the first frame, so that the frames' times are those of network and skinning.
 
     Args:
         model: a trained network.
         dressed: the body and the garment that the model was trained for.
         motion: T frames.
         betas: shape numbers of the body; None is the mean body.
-        quasi_static: give instead, for each frame, the output after that pose was held still for a second:
-            the network's static answer. Nothing of it is timed.
+        quasi_static: give instead, for each frame, the output after that pose was held still for a
+            second: the network's static answer. Nothing of it is timed.
 
     Returns:
         World positions (T, V, 3) [m], float64; status `diverged` if one is not finite.
@@ -88,8 +88,9 @@ def prepare_roll_out(
 ) -> Callable[[], Trajectory]:
     """Do all that comes before the first frame; return a function that gives the trajectory of `roll_out`.
 
-    Every frame is computed; the trajectory holds those whose numbers are `kept`, None for all. `postprocess`
-    is applied to each frame's positions (V, 3) [m] and number. All else: see `prepare_frames`.
+    Every frame is computed; the trajectory holds those whose numbers are `kept`, None for all.
+    `postprocess` is applied to each frame's positions (V, 3) [m] and number. All else: see
+    `prepare_frames`.
     """
     frames = prepare_frames(model, dressed, motion, betas, earlier=earlier)
     held = np.arange(motion.frames) if kept is None else kept
@@ -113,7 +114,8 @@ def prepare_batch(
 ) -> Callable[[], np.ndarray]:
     """Return a function that computes `copies` bodies in that motion at once, (T, copies, V, 3) [m], float32.
 
-    Positions are relative to the pelvis. Frame follows frame, as the state is carried. Raises RollOutError.
+    Positions are relative to the pelvis. Frame follows frame, as the state is carried. Raises
+    RollOutError.
     """
     features = _features(model, dressed, motion, None)[:, None, None].expand(-1, copies, -1, -1)
     rest, weights = dressed.rest(), dressed.weights(model.recipe.smoothing)
@@ -201,9 +203,9 @@ def prepare_frames(
 ) -> Callable[[], Iterator[np.ndarray]]:
     """Return a function that starts the frames of `roll_out`, each (V, 3) [m], computed when asked for.
 
-    Inputs and joint transforms are made, and the network warmed up, before this returns. The inputs know the
-    motion `earlier`, and the roll-out starts from the state that it leaves. Without a model it is skinning
-    alone, by the weights of the default recipe. Raises RollOutError if the model does not fit.
+    Inputs and joint transforms are made, and the network warmed up, before this returns. The inputs know
+    the motion `earlier`, and the roll-out starts from the state that it leaves. Without a model it is
+    skinning alone, by the weights of the default recipe. Raises RollOutError if the model does not fit.
     """
     features, network, recipe = np.empty((motion.frames, 0), np.float32), None, DEFAULT
     if model is not None:
@@ -239,8 +241,8 @@ def prepare_frame_inputs(
 ) -> Callable[[int], tuple[Tensor | None, Tensor, np.ndarray]]:
     """Return a function that makes one frame's inputs from its pose and those before, as an application does.
 
-    It gives features (D,), or None without a model, joint transforms (24, 3, 4) and pelvis (3,) [m]: the same
-    numbers that `prepare_frames` makes for all frames at once. Raises RollOutError.
+    It gives features (D,), or None without a model, joint transforms (24, 3, 4) and pelvis (3,) [m]: the
+    same numbers that `prepare_frames` makes for all frames at once. Raises RollOutError.
     """
     whole = earlier.followed_by(motion) if earlier else motion
     first = whole.frames - motion.frames

@@ -4,10 +4,11 @@
     fit: 10 -> 20 (ReLU) -> 3V,   wrinkles: one GRU of 1500, one linear layer to 3V
 
 It learns simulated vertices, as the supervised network does. Its authors train the
-two parts one after the other, the fit on drapes of many bodies in one pose; here both are trained together on
-the simulated motions. Those show one body shape, the mean one: the fit reads a constant and can only give a
-constant, a mean drape that the last layer's bias could hold as well. Its numbers say nothing of how it would
-do on other bodies. The authors' collision post-processing (2 mm) is no part of the network.
+two parts one after the other, the fit on drapes of many bodies in one pose; here both are trained
+together on the simulated motions. Those show one body shape, the mean one: the fit reads a constant and
+can only give a constant, a mean drape that the last layer's bias could hold as well. Its numbers say
+nothing of how it would do on other bodies. The authors' collision post-processing (2 mm) is no part of
+the network.
 """
 
 from __future__ import annotations
@@ -32,7 +33,9 @@ class FitAndWrinkles(GarmentNetwork):
 
     def __init__(self, inputs: int, vertices: int) -> None:
         super().__init__(inputs, vertices)
-        self.fit = nn.Sequential(nn.Linear(SHAPES, FIT_WIDTH), nn.ReLU(), nn.Linear(FIT_WIDTH, 3 * vertices))
+        self.fit = nn.Sequential(
+            nn.Linear(SHAPES, FIT_WIDTH), nn.ReLU(), nn.Linear(FIT_WIDTH, 3 * vertices)
+        )
         self.gru = nn.GRU(inputs, WRINKLE_WIDTH, batch_first=True)
         self.offsets = nn.Linear(WRINKLE_WIDTH, 3 * vertices)
 
@@ -40,9 +43,13 @@ class FitAndWrinkles(GarmentNetwork):
         """Return offsets (N, T, V, 3) [m] and the state (1, N, 1500) after the last frame."""
         normalised = self.normalise(features)
         fast, drape = self.closed_form, cast(nn.Linear, self.fit[-1])
-        hidden, state = run_gru(self.gru, normalised, state, closed_form=fast)  # (N, T, 1500), (1, N, 1500)
+        hidden, state = run_gru(
+            self.gru, normalised, state, closed_form=fast
+        )  # (N, T, 1500), (1, N, 1500)
         shape = self.fit[:-1](normalised[..., -SHAPES:])
-        flat = run_linear(drape, shape, closed_form=fast) + run_linear(self.offsets, hidden, closed_form=fast)
+        flat = run_linear(drape, shape, closed_form=fast) + run_linear(
+            self.offsets, hidden, closed_form=fast
+        )
         return (self.output_scale * flat).unflatten(-1, (self.vertices, 3)), state
 
     def last_layers(self) -> tuple[nn.Linear, ...]:

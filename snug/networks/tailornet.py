@@ -2,12 +2,12 @@
 
     offsets(theta, beta) = low(theta, beta) + high(theta)
 
-Both have three layers of 1024 with ReLU, dropout 0.2 after the first; they learn by L1 in the unposed space
-(snug.training.simulated_data.BandTargets): low the diffusion-smoothed offsets of the simulation, high
-the rest. With its authors the high band is a mean of several networks, each of a pivot, that is of a body
-shape and a style of garment, weighed by the distance from it. Our simulated motions show the mean body in one
-style: one pivot, of weight one, is all that they can teach, and memory and run time are those of one pivot
-instead of twenty. A static method: it sees one pose.
+Both have three layers of 1024 with ReLU, dropout 0.2 after the first; they learn by L1 in the unposed
+space (snug.training.simulated_data.BandTargets): low the diffusion-smoothed offsets of the simulation,
+high the rest. With its authors the high band is a mean of several networks, each of a pivot, that is of a
+body shape and a style of garment, weighed by the distance from it. Our simulated motions show the mean
+body in one style: one pivot, of weight one, is all that they can teach, and memory and run time are those
+of one pivot instead of twenty. A static method: it sees one pose.
 """
 
 from __future__ import annotations
@@ -64,7 +64,9 @@ class FrequencyMixture(GarmentNetwork):
         drop = [None, None] if masks is None else list(masks)
         low, high = self.low(normalised, drop[0]), self.high(normalised[..., :-SHAPES], drop[1])
         shape = (self.vertices, 3)
-        return (self.output_scale * low).unflatten(-1, shape), (self.output_scale * high).unflatten(-1, shape)
+        return (self.output_scale * low).unflatten(-1, shape), (self.output_scale * high).unflatten(
+            -1, shape
+        )
 
     def forward(self, features: Tensor, state: Tensor | None = None) -> tuple[Tensor, None]:
         """Return offsets (N, T, V, 3) [m] and no state."""

@@ -40,9 +40,10 @@ class TrainedModel:
         summary: numbers and names of high windows, of updates left out, of returns to good weights.
         unit: of the loss: joules, or a distance from the simulated vertices.
         fps: frame rate of the training motions [1/s]; 0 where it is not known.
-        triangles: digest of the garment's triangles, see digest_of_triangles; empty where it is not known.
-        origin: what is known of its training: data, commit, versions, processor, and digests of all that it
-            depends on, see benchmarks.runner.networks; empty where nobody noted it.
+        triangles: digest of the garment's triangles, see digest_of_triangles; empty where it is not
+            known.
+        origin: what is known of its training: data, commit, versions, processor, and digests of all that
+            it depends on, see benchmarks.runner.networks; empty where nobody noted it.
 
     Example:
         >>> from snug.recipe import DEFAULT
@@ -103,7 +104,8 @@ class TrainedModel:
         >>> TrainedModel.load("tshirt-snug")
         Traceback (most recent call last):
         ...
-        snug.networks.trained_model.ModelFileError: tshirt-snug: neither a model file nor a network of the \
+        snug.networks.trained_model.ModelFileError: tshirt-snug: neither a model file nor a network of the
+        \
 package: pbns-tshirt, snug-tshirt, supervised-tshirt
         """
         path = _find_file(path)
@@ -117,10 +119,17 @@ package: pbns-tshirt, snug-tshirt, supervised-tshirt
                 raise ModelFileError(f"{path}: format {str(data['format'])[:40]!r}, {known}")
             recipe = Recipe.from_dict(data["recipe"])
             network = make_network(
-                data["kind"], data["inputs"], data["vertices"], recipe, seed=data["seed"], pins=data["pins"]
+                data["kind"],
+                data["inputs"],
+                data["vertices"],
+                recipe,
+                seed=data["seed"],
+                pins=data["pins"],
             )
             if network.state_dict().keys() != tensors.keys():
-                raise ModelFileError(f"{path}: not the weights of this version's {data['kind']}: train again")
+                raise ModelFileError(
+                    f"{path}: not the weights of this version's {data['kind']}: train again"
+                )
             network.load_state_dict(tensors)
             copied = {name: data[name] for name in _COPIED}
         except ModelFileError:

@@ -1,7 +1,8 @@
 """Trained networks of the package: one file each, which `snug.TrainedModel.load` finds by its name.
 
-`snug-tshirt` is SNUG for the T-shirt, trained with seed 0; another seed stands behind: `snug-tshirt-seed1`.
-The header of a file names recipe, data, commit, versions and processor of its training.
+`snug-tshirt` is SNUG for the T-shirt, trained with seed 0; another seed stands behind:
+`snug-tshirt-seed1`. The header of a file names recipe, data, commit, versions and processor of its
+training.
 """
 
 from __future__ import annotations

@@ -1,13 +1,14 @@
 """Augmented training motions: limbs of different clips put together, mirrored, and turned a little.
 
-Self-supervision needs no simulation, so a training set is not bound to what was recorded. Recorded clips show
-a network few combinations of legs, spine and arms, and on a new kind of motion it then extrapolates. A mixed
-clip takes the root, the spine, each leg and each arm from six random places of the training clips (mirrored
-half of the time), scales legs and spine, adds to each joint that carries cloth a slow turn about a random
-axis, lifts some thighs, hangs each arm at a random distance from the torso, and opens the hips where a thigh
-comes too near to it. Legs that always come as a pair show no lunge; a network that has met no thigh as high
-as in a squat lets it through the hem; and people, unlike tables of angles, let their arms hang close to the
-torso and turned in their sockets. Every part stays continuous in time, so velocities keep their meaning.
+Self-supervision needs no simulation, so a training set is not bound to what was recorded. Recorded clips
+show a network few combinations of legs, spine and arms, and on a new kind of motion it then extrapolates.
+A mixed clip takes the root, the spine, each leg and each arm from six random places of the training clips
+(mirrored half of the time), scales legs and spine, adds to each joint that carries cloth a slow turn
+about a random axis, lifts some thighs, hangs each arm at a random distance from the torso, and opens the
+hips where a thigh comes too near to it. Legs that always come as a pair show no lunge; a network that has
+met no thigh as high as in a squat lets it through the hem; and people, unlike tables of angles, let their
+arms hang close to the torso and turned in their sockets. Every part stays continuous in time, so
+velocities keep their meaning.
 """
 
 from __future__ import annotations
@@ -36,13 +37,16 @@ BODY_PARTS: tuple[tuple[str, ...], ...] = (
 PART_SCALES = dict.fromkeys(
     (1, 2, 3), (0.6, 1.3)
 )  # of legs and spine; an arm swung further might enter the torso
-# Degrees between upper arm and spine where an arm of a clip comes nearest. The lower end is where recorded
-# arms are spread to (snug.motion.motion.ARMS_CLEAR): nearer, a sleeve is pinched and no shape is good.
+# Degrees between upper arm and spine where an arm of a clip comes nearest. The lower end is where
+# recorded arms are spread to (snug.motion.motion.ARMS_CLEAR): nearer, a sleeve is pinched and no shape is
+# good.
 ARM_DEGREES = (25.0, 50.0)
-# Degrees between thigh and spine: a hip bends by about 120 and no further. At 40, as a squat under the spine
-# of a bow has it, thighs enter the belly, and no hem between them is free.
+# Degrees between thigh and spine: a hip bends by about 120 and no further. At 40, as a squat under the
+# spine of a bow has it, thighs enter the belly, and no hem between them is free.
 HIP_DEGREES = 60.0
-LIFT_DEGREES = 90.0  # degrees, at most: a lifted thigh comes up and goes down again by a random part of it
+LIFT_DEGREES = (
+    90.0  # degrees, at most: a lifted thigh comes up and goes down again by a random part of it
+)
 # Turn of each joint, relative to the recipe's; the collar bone turns little, the shoulder most.
 TURN_SHARES = {
     "pelvis": 1.0, "spine1": 1.0, "spine2": 1.0, "spine3": 1.0, "left_hip": 1.2, "right_hip": 1.2,
@@ -87,7 +91,8 @@ def make_mixed_clips(
 ) -> list[Motion]:
     """Make about `frames` frames of mixed clips, named mixed_0, mixed_1, ...; deterministic for a seed.
 
-    turn: standard deviation of the added turns, per axis [rad]; lifted: share of the thighs that are lifted.
+    turn: standard deviation of the added turns, per axis [rad]; lifted: share of the thighs that are
+    lifted.
     """
     random = np.random.default_rng(seed)
     count = max(1, round(frames / CLIP_FRAMES)) if frames > 0 else 0
@@ -130,9 +135,9 @@ def _mixed(
 def hang_arms(motion: Motion, nearest: np.ndarray) -> Motion:
     """Turn each shoulder about the chest's front axis, by one angle in all frames.
 
-    The angle is that which brings the smallest angle between upper arm and downward spine to `nearest`, (2,)
-    [rad], left and right, where the arm is square to that axis. Others end elsewhere: of 666 arms of clips of
-    seed 0, 6 % below 25 degrees.
+    The angle is that which brings the smallest angle between upper arm and downward spine to `nearest`,
+    (2,) [rad], left and right, where the arm is square to that axis. Others end elsewhere: of 666 arms of
+    clips of seed 0, 6 % below 25 degrees.
     """
     poses = motion.poses.copy()
     outward = (nearest - arm_clearance(motion).min(axis=0)) * [1.0, -1.0]
@@ -146,7 +151,8 @@ def hang_arms(motion: Motion, nearest: np.ndarray) -> Motion:
 def open_hips(motion: Motion) -> Motion:
     """Turn each thigh back, in the frames where it is nearer to the spine than HIP_DEGREES.
 
-    It turns about the axis through the hips, which a thigh to the side is not square to: hence repeatedly.
+    It turns about the axis through the hips, which a thigh to the side is not square to: hence
+    repeatedly.
     """
     for _ in range(HIP_ROUNDS):
         missing = np.maximum(0.0, np.deg2rad(HIP_DEGREES) - lap_clearance(motion))
@@ -175,7 +181,8 @@ def make_training_set(
 ) -> TrainingSet:
     """Make the training set: the motions and, if the energies teach the network, augmented clips.
 
-    Where clips have shapes, the recipe's share of them has numbers from its U(-r, r); all else the mean body.
+    Where clips have shapes, the recipe's share of them has numbers from its U(-r, r); all else the mean
+    body.
     """
     clips = augment(motions, recipe, vertices=dressed.vertices, seed=seed) if kind.physics else []
     shapes = None

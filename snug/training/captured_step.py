@@ -1,10 +1,10 @@
 """A step on the energies, captured on a GPU as CUDA graphs and replayed with other windows.
 
-A step is some hundreds of operations of a few microseconds each, and Python takes longer to ask for them than
-a GPU to carry them out. So what does not depend on any number that Python has to see is captured: from the
-windows to gradients and the places of contact anchors, and then the update. Between the two the guard looks
-at the energies. A batch that it would not simply follow is left to the step in single operations, which
-decides what becomes of it.
+A step is some hundreds of operations of a few microseconds each, and Python takes longer to ask for them
+than a GPU to carry them out. So what does not depend on any number that Python has to see is captured:
+from the windows to gradients and the places of contact anchors, and then the update. Between the two the
+guard looks at the energies. A batch that it would not simply follow is left to the step in single
+operations, which decides what becomes of it.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ UNCAPTURED = 3  # first steps, in single operations: they compile, and make Adam
 class CapturedTrainer(Trainer):
     """A trainer with two graphs: from the windows to gradients, and the update by these.
 
-    Where a step cannot be captured it takes every step in single operations: the step must be on the energies
-    alone, the network read no frames before its windows, and no motion have a body of its own.
+    Where a step cannot be captured it takes every step in single operations: the step must be on the
+    energies alone, the network read no frames before its windows, and no motion have a body of its own.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
@@ -121,7 +121,9 @@ class CapturedTrainer(Trainer):
         """Follow the gradients, and keep the places of the anchors."""
         held = self._held
         taught = [p for p in self.network.parameters() if p.grad is not None]
-        for parameter, gradient in zip(taught, held["gradients"]):  # a step in single operations has its own
+        for parameter, gradient in zip(
+            taught, held["gradients"]
+        ):  # a step in single operations has its own
             parameter.grad = gradient
         on_gpu = self.device.type == "cuda"
         for group in self.optimiser.param_groups:

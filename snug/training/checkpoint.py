@@ -28,8 +28,8 @@ class Checkpoint:
         path: the file.
         minutes: after so many minutes; 0 for never.
         resume: continue from the file, if there is one.
-        key: further facts that the run depends on, as the version of the code. A checkpoint that has another
-            key, or cannot be read, is then replaced; without a key it is refused.
+        key: further facts that the run depends on, as the version of the code. A checkpoint that has
+            another key, or cannot be read, is then replaced; without a key it is refused.
     """
 
     path: Path

@@ -1,12 +1,12 @@
 """Cache of contact anchors: where each sample of a garment may touch the body, searched anew in training.
 
-The loss needs, for each contact sample x of each frame, a plane (closest body point c, outward normal n), so
-that d = n.(x - c). Searching it in every step would cost more than the rest of the step together. So an
-anchor (a body face and barycentric coordinates) is kept for each frame and sample; body vertices of the frame
-carry it to a plane in no time. It walks with its sample (snug.kernels.contact), and a few frames of each
-batch are searched anew (snug.training.contact_planes), by the simulator's own search and rule of regions.
-Positions are float32, relative to the pelvis. With thousands of frames cached, an anchor has four bytes:
-barycentric coordinates are whole 255ths, which moves it along its face by some 0.03 mm.
+The loss needs, for each contact sample x of each frame, a plane (closest body point c, outward normal n),
+so that d = n.(x - c). Searching it in every step would cost more than the rest of the step together. So
+an anchor (a body face and barycentric coordinates) is kept for each frame and sample; body vertices of
+the frame carry it to a plane in no time. It walks with its sample (snug.kernels.contact), and a few
+frames of each batch are searched anew (snug.training.contact_planes), by the simulator's own search and
+rule of regions. Positions are float32, relative to the pelvis. With thousands of frames cached, an anchor
+has four bytes: barycentric coordinates are whole 255ths, which moves it along its face by some 0.03 mm.
 """
 
 from __future__ import annotations
@@ -28,8 +28,8 @@ EXACT = 0.015  # m: a sample farther from the skin than this is in no contact, a
 class Patch:
     """The part of a body that one garment may touch.
 
-    It has faces (Q, 3) between vertices (P,) of the body, at most `region` [m] in the T-pose from a sample of
-    the garment (S, 3) [m].
+    It has faces (Q, 3) between vertices (P,) of the body, at most `region` [m] in the T-pose from a
+    sample of the garment (S, 3) [m].
 
     Raises:
         ValueError: no face of the body lies within `region` of the garment.
@@ -47,7 +47,9 @@ class Patch:
 
         middles = body_positions[body_faces].mean(axis=1)
         if cKDTree(middles).query(samples)[0].min() >= region:
-            raise ValueError(f"no body face lies within {region} m of the garment: they do not fit together")
+            raise ValueError(
+                f"no body face lies within {region} m of the garment: they do not fit together"
+            )
         kept = body_faces[reachable_faces(samples, middles, region)]
         self.body_vertices, flat = np.unique(kept, return_inverse=True)
         self.faces = flat.reshape(-1, 3).astype(np.int32)
@@ -108,9 +110,10 @@ class ContactCache:
     ) -> np.ndarray:
         """Return the contact energy (C, TRAINING_LANES) [J] of garments; add its gradient to `gradients`.
 
-        Garments x (C, V, 3, TRAINING_LANES) lie as in snug.kernels.skinning, the patch of each of the frames
-        (N, T) in its row (N, T) of positions [m] and normals (R, P, 3). With `walk`, anchors near the skin
-        first walk to where their samples are, and stay there. Lanes beyond the last frame are zero.
+        Garments x (C, V, 3, TRAINING_LANES) lie as in snug.kernels.skinning, the patch of each of the
+        frames (N, T) in its row (N, T) of positions [m] and normals (R, P, 3). With `walk`, anchors near
+        the skin first walk to where their samples are, and stay there. Lanes beyond the last frame are
+        zero.
         """
         values, patch = np.zeros((len(x), TRAINING_LANES), np.float32), self.patch
         body = positions, normals, patch.faces.view(np.uint32), patch.adjacency, patch.centroids
@@ -121,7 +124,9 @@ class ContactCache:
         )  # fmt: skip
         return values
 
-    def requery(self, frame: int, points: np.ndarray, positions: np.ndarray, *, exact: bool = False) -> None:
+    def requery(
+        self, frame: int, points: np.ndarray, positions: np.ndarray, *, exact: bool = False
+    ) -> None:
         """Search one frame's anchors anew: points (S, 3) float32, positions (P, 3) float32 of that frame.
 
         exact: no old anchor stands for being roughly right.

@@ -1,7 +1,8 @@
 """Contact anchors held and searched in torch on any device, as ContactCache does on a CPU.
 
-Normals are rounded to the same 127 steps as there, so that both give the same planes. The search is by brute
-force: of all allowed body vertices the nearest few, and of the faces around those the one that comes closest.
+Normals are rounded to the same 127 steps as there, so that both give the same planes. The search is by
+brute force: of all allowed body vertices the nearest few, and of the faces around those the one that
+comes closest.
 """
 
 from __future__ import annotations
@@ -48,7 +49,9 @@ class TensorContactCache:
         # Gathered, not scattered: sums are then taken in one order on a GPU too.
         present = (self.around >= 0)[..., None]
         normals = (of_faces[:, self.around.clamp(min=0)] * present).sum(-2)
-        return (127.0 * normals / (torch.linalg.vector_norm(normals, dim=-1, keepdim=True) + 1e-30)).round()
+        return (
+            127.0 * normals / (torch.linalg.vector_norm(normals, dim=-1, keepdim=True) + 1e-30)
+        ).round()
 
     def held(self, frames: Tensor) -> Anchors:
         """Return the anchors of frames (N,)."""
@@ -83,7 +86,13 @@ class TensorContactCache:
         self.faces[frames], self.barycentric[frames] = anchors
 
     def _walked(
-        self, x: Tensor, faces: Tensor, barycentric: Tensor, positions: Tensor, normals: Tensor, reach: float
+        self,
+        x: Tensor,
+        faces: Tensor,
+        barycentric: Tensor,
+        positions: Tensor,
+        normals: Tensor,
+        reach: float,
     ) -> Anchors:
         """Return where anchors (N, S) of samples x (N, S, 3) rest, on bodies (N, P, 3).
 
@@ -130,7 +139,9 @@ class TensorContactCache:
         s, t, r = b - a, c - a, points[:, None] - a
         v, w = closest_on_triangle(s, t, r)
         squared = (r - v[..., None] * s - w[..., None] * t).square().sum(-1)
-        far = (self.centroids[faces.clamp(min=0)] - home[:, None]).square().sum(-1) >= self.patch.region**2
+        far = (self.centroids[faces.clamp(min=0)] - home[:, None]).square().sum(
+            -1
+        ) >= self.patch.region**2
         squared = torch.where(faces < 0, torch.inf, squared + FORBIDDEN * far)
         best = squared.argmin(1, keepdim=True)
         pick = [table.gather(1, best)[:, 0] for table in (faces, v, w)]

@@ -1,7 +1,8 @@
 """Contact planes of batches of a training set, from cached anchors, queried anew as the network learns.
 
-The middle frames of a few windows in a step are searched, for skin that no walk would reach. Their anchors
-are propagated to the frames around them that show almost the same pose: farther off the thigh is elsewhere.
+The middle frames of a few windows in a step are searched, for skin that no walk would reach. Their
+anchors are propagated to the frames around them that show almost the same pose: farther off the thigh is
+elsewhere.
 """
 
 from __future__ import annotations
@@ -32,11 +33,13 @@ MARKED = 25  # every so many vertices of the patch there is a mark
 class BodyPatches:
     """The patch of a body in every frame of a training set.
 
-    Anchors of a ContactCache lie on arrays that kernels pose, others on tensors that torch poses on the set's
-    device. kept: whether each frame has one body for good; the kernels then pose them all once.
+    Anchors of a ContactCache lie on arrays that kernels pose, others on tensors that torch poses on the
+    set's device. kept: whether each frame has one body for good; the kernels then pose them all once.
     """
 
-    def __init__(self, data: TrainingSet, cache: ContactCache | TensorContactCache, *, kept: bool) -> None:
+    def __init__(
+        self, data: TrainingSet, cache: ContactCache | TensorContactCache, *, kept: bool
+    ) -> None:
         body, vertices, device = data.dressed.body, cache.patch.body_vertices, data.device
         self.data, self.kernels = data, isinstance(cache, ContactCache)
         self.normals: Callable[[Any], Any] = cache.normals
@@ -127,7 +130,8 @@ class BodyPatches:
 REFRESH = 0.01
 # Frames before and after a searched one that may take over its anchors; at the start.
 REACH, FIRST_REACH = 3, 7
-# m: how far a mark of the body may have moved from a frame to one that takes over its anchors; at the start.
+# m: how far a mark of the body may have moved from a frame to one that takes over its anchors; at the
+# start.
 NEAR, FIRST_NEAR = 0.03, 0.07
 
 
@@ -144,7 +148,9 @@ class TrainingContact:
         self.patch = Patch(contact.rest_samples, body.shaped(), body.faces)
         frames = data.frames
         self.cache = (
-            ContactCache(self.patch, frames) if kernels else TensorContactCache(self.patch, frames, device)
+            ContactCache(self.patch, frames)
+            if kernels
+            else TensorContactCache(self.patch, frames, device)
         )
         self.bodies = BodyPatches(data, self.cache, kept=kept)
         self.stencils = torch.as_tensor(contact.stencils, device=device)
@@ -156,8 +162,8 @@ class TrainingContact:
     def planes(self, batch: Batch, posed: Posed, x: Tensor | None = None) -> Planes:
         """Return points and normals (N, T, S, 3) at the cached anchors, or, with kernels, the energy itself.
 
-        x (N, T, V, 3): vertices that the anchors first walk to, until `settle` decides whether for good; None
-        where they have just been searched.
+        x (N, T, V, 3): vertices that the anchors first walk to, until `settle` decides whether for good;
+        None where they have just been searched.
         """
         walk = x is not None
         if walk:
@@ -225,7 +231,10 @@ class TrainingContact:
         """
         first = self.data.first
         motion = int(self.data.motion_of(frame))
-        start, stop = max(frame - reach, int(first[motion])), min(frame + reach + 1, int(first[motion + 1]))
+        start, stop = (
+            max(frame - reach, int(first[motion])),
+            min(frame + reach + 1, int(first[motion + 1])),
+        )
         marks = self.bodies.marks
         moved = np.linalg.norm(marks[start:stop] - marks[frame], axis=2).max(axis=1)
         far = (start + np.flatnonzero(moved > near)).tolist()

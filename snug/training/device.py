@@ -34,7 +34,9 @@ def find_device(name: str) -> torch.device:
     if device.type == "cpu":
         return device
     if (device.index or 0) >= torch.cuda.device_count():
-        raise DeviceError(f"--device {name}: this machine has {torch.cuda.device_count()} of them; use cpu")
+        raise DeviceError(
+            f"--device {name}: this machine has {torch.cuda.device_count()} of them; use cpu"
+        )
     torch.backends.cudnn.allow_tf32 = False  # it rounds what is multiplied to ten bits
     return device
 
@@ -42,8 +44,8 @@ def find_device(name: str) -> torch.device:
 def compiled(function: Callable[P, R], device: torch.device) -> Callable[P, R]:
     """Return the function compiled by torch for a GPU, where launching small kernels takes most of the time.
 
-    It is returned as it is on a CPU, where the kernels take its place, and where Triton or a C compiler is
-    missing. It is compiled once for each size of its arguments, at the first call.
+    It is returned as it is on a CPU, where the kernels take its place, and where Triton or a C compiler
+    is missing. It is compiled once for each size of its arguments, at the first call.
     """
     compiler = os.environ.get("CC") or any(map(shutil.which, ("cc", "gcc", "clang")))
     if device.type == "cuda" and compiler and find_spec("triton"):
@@ -57,8 +59,8 @@ class CudaGraph:
     On a CPU it is called each time. On a GPU every call overwrites what the one before has returned.
 
     Args:
-        function: takes tensors of the same sizes in every call; it neither synchronises nor copies from or to
-            the CPU.
+        function: takes tensors of the same sizes in every call; it neither synchronises nor copies from
+            or to the CPU.
         device: where it runs.
         warm_up: calls before the capture, in which libraries make their plans and workspaces; 0 for a
             function that must not run more often than it is called.
@@ -77,7 +79,9 @@ class CudaGraph:
         if self._graph is None:
             self._graph = self._captured(inputs)
         for held, given in zip(self._inputs, inputs, strict=True):
-            assert (held.shape, held.dtype) == (given.shape, given.dtype), "a graph takes one size of inputs"
+            assert (held.shape, held.dtype) == (given.shape, given.dtype), (
+                "a graph takes one size of inputs"
+            )
             held.copy_(given, non_blocking=True)
         self._graph.replay()
         return self._outputs

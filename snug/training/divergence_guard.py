@@ -3,9 +3,9 @@
 Three cases, from harmless to grave:
 - a window is above the recipe's `spike`: the gradient of its step is clipped;
 - a window, or the gradient of a batch, is not finite: the update is left out;
-- `PATIENCE` batches in a row are not finite, or their mean is above both `spike` and `RUNAWAY` times the size
-  of the usual energy, which is negative where a garment hangs below the pelvis: the network is lost. Weights
-  and Adam's moments go back to the last ones seen to be good, and the learning rate is halved.
+- `PATIENCE` batches in a row are not finite, or their mean is above both `spike` and `RUNAWAY` times the
+  size of the usual energy, which is negative where a garment hangs below the pelvis: the network is lost.
+  Weights and Adam's moments go back to the last ones seen to be good, and the learning rate is halved.
 A recipe with a spike beyond all energies, as the paper's, is left alone until something is not finite.
 No decision comes from a clock, so a run with incidents repeats as exactly as one without.
 """
@@ -57,8 +57,8 @@ class DivergenceGuard:
             name: gives the name of a window, by its row.
 
         Returns:
-            `update`; `clip` the gradient; `distrust`: clip it, and learn nothing else from the prediction;
-            `leave out`.
+            `update`; `clip` the gradient; `distrust`: clip it, and learn nothing else from the
+            prediction; `leave out`.
 
         Raises:
             TrainingError: after GIVE_UP updates left out in a row.
@@ -84,7 +84,8 @@ class DivergenceGuard:
     def accepts(self, verdict: str, gradient_norm: float) -> bool:
         """Return whether the gradient of the batch, with that verdict, may be followed.
 
-        One that is not finite would ruin the weights; the highest window is named. Raises as `judge` does.
+        One that is not finite would ruin the weights; the highest window is named. Raises as `judge`
+        does.
         """
         if np.isfinite(gradient_norm):
             self.skipped_in_a_row = 0

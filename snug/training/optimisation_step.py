@@ -47,8 +47,8 @@ def start_network(kind: str, data: TrainingSet, *, seed: int) -> GarmentNetwork:
 class Trainer:
     """A network in training, and all that its next step depends on.
 
-    Everything random comes from `seed`; no decision comes from a clock. Random numbers are drawn on the CPU
-    whatever the device, so that every device sees the same. Arguments: see
+    Everything random comes from `seed`; no decision comes from a clock. Random numbers are drawn on the
+    CPU whatever the device, so that every device sees the same. Arguments: see
     snug.training.train_network.train_network.
     """
 
@@ -114,7 +114,9 @@ class Trainer:
         if self.loss and recipe.remembered and not self.shaped and start is not None:
             states = start.shape[0], start.shape[-1]
             self.hidden_states = HiddenStateCache(self.data.first, states, device)
-        self.guard = DivergenceGuard(self.network, self.optimiser, spike=recipe.spike if self.loss else None)
+        self.guard = DivergenceGuard(
+            self.network, self.optimiser, spike=recipe.spike if self.loss else None
+        )
 
     def contact_of(self, data: TrainingSet) -> TrainingContact | None:
         """Return contact anchors for the frames of a set; None if the recipe has no collision."""
@@ -182,8 +184,9 @@ class Trainer:
     ) -> bool:
         """Search the anchors of windows (N, T) above the spike limit at once; return whether there are any.
 
-        An old anchor can claim a contact that is none, and so can a rough one: hence the search is exact. Not
-        where most windows are high: then it is the network that is lost, and its vertices are no guide.
+        An old anchor can claim a contact that is none, and so can a rough one: hence the search is exact.
+        Not where most windows are high: then it is the network that is lost, and its vertices are no
+        guide.
         """
         assert self.contact is not None
         if number < SETTLING:
@@ -227,7 +230,8 @@ class Trainer:
     ) -> tuple[dict[str, float], bool]:
         """Descend by the mean joules a frame, unless the guard leaves it out.
 
-        Returns the means by term, and whether the prediction is good enough to search contact anchors with.
+        Returns the means by term, and whether the prediction is good enough to search contact anchors
+        with.
         """
         stacked = torch.stack(list(terms.values()), 1)  # (N, terms, T)
         whole = stacked.detach()
@@ -272,7 +276,9 @@ class Trainer:
         for name, parameter in self.network.named_parameters():
             prefix = f"adam.{name}."
             moments = {n.removeprefix(prefix): t for n, t in tensors.items() if n.startswith(prefix)}
-            self.optimiser.state[parameter] = {key: tensor.to(self.device) for key, tensor in moments.items()}
+            self.optimiser.state[parameter] = {
+                key: tensor.to(self.device) for key, tensor in moments.items()
+            }
         self.network.load_state_dict(select_tensors(tensors, "network"))
         if self.hidden_states:
             self.hidden_states.states.copy_(tensors["hidden_states"])

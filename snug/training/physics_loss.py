@@ -5,25 +5,26 @@ For a sub-sequence of frames 1..T with vertices x_1..x_T the loss is
     sum_t [strain(x_t) + bending(x_t) + gravity(x_t) + collision(x_t)] / T
         + sum_{t >= 3} inertia(x_t) / (T - 2)
 
-in joules a frame: the mean of each term over the frames that have it. A frame has inertia where two frames
-before it are in the window; its gradient reaches all three. So the terms of a frame weigh as in equation 5,
-however long the window is. The recipe names two other forms of inertia (Recipe.inertia_form).
+in joules a frame: the mean of each term over the frames that have it. A frame has inertia where two
+frames before it are in the window; its gradient reaches all three. So the terms of a frame weigh as in
+equation 5, however long the window is. The recipe names two other forms of inertia (Recipe.inertia_form).
 
 Each energy is one torch expression in `reference_sim.energies`, the definition. On a CPU closed-form
 kernels (those that a term declares as "training_batch", or its own gradient) give the same values and
 gradients in a small part of the time. On a GPU the definitions are compiled by torch.
 The contact planes are the one difference: training keeps an anchor for each sample, and takes the skin's
-normal there, where the simulator searches anew in every step and takes the direction to the closest point.
+normal there, where the simulator searches anew in every step and takes the direction to the closest
+point.
 
 The material of PBNS itself (Bertiche et al. 2021), springs, hinges, uniform mass, squared contact::
 
     edges    15 (l - l0)^2                  [J]  reference_sim's StretchSpring, exactly
-    bending  5e-5 |n0 - n1|^2               [J]  reference_sim's BendHinge, 5e-5 theta^2: the nearest there is
-    gravity  m g y, m = 0.3 kg/m^2 A / V    [J]  the same mass for every vertex
+    bending  5e-5 |n0 - n1|^2               [J]  reference_sim's BendHinge, 5e-5 theta^2: the nearest
+    there is gravity  m g y, m = 0.3 kg/m^2 A / V    [J]  the same mass for every vertex
     contact  25 max(4 mm - n.(x - c), 0)^2  [J]  on vertices, with the contact planes of all our training
 
-`|n0 - n1|^2 = 4 sin^2(theta/2) = theta^2 - theta^4/12 + ...`: the hinge has 3 % more at 0.6 rad, and goes on
-growing where a folded edge no longer resists. Constants as in the authors' own training.
+`|n0 - n1|^2 = 4 sin^2(theta/2) = theta^2 - theta^4/12 + ...`: the hinge has 3 % more at 0.6 rad, and goes
+on growing where a folded edge no longer resists. Constants as in the authors' own training.
 """
 
 from __future__ import annotations
@@ -121,9 +122,9 @@ def make_contact(cloth: Cloth, recipe: Recipe) -> ContactPenalty:
 class ClosedForms(torch.autograd.Function):
     """Energies of each configuration of a batch by kernels in lanes, which all add to one gradient.
 
-    `apply(x, *kernels)`: x (N, T, V, 3) float32 -> as many (N, T) [J] as kernels. Differentiable once, by x
-    alone, and only in their plain sum times a number: raises ValueError for energies that are weighed against
-    each other.
+    `apply(x, *kernels)`: x (N, T, V, 3) float32 -> as many (N, T) [J] as kernels. Differentiable once, by
+    x alone, and only in their plain sum times a number: raises ValueError for energies that are weighed
+    against each other.
     """
 
     @staticmethod
@@ -140,7 +141,9 @@ class ClosedForms(torch.autograd.Function):
         """Return the gradient of the sum, times its factor."""
         factors = torch.stack(above)
         if (factors != factors.flatten()[0]).any():
-            raise ValueError("kernels give the gradient of the sum of all energies of a batch: weigh none")
+            raise ValueError(
+                "kernels give the gradient of the sum of all energies of a batch: weigh none"
+            )
         return ctx.gradient * factors.flatten()[0], *([None] * len(above))
 
 
@@ -207,7 +210,9 @@ class PhysicsLoss:
             made = {name: fast_kernel(term, "training_batch") for name, term in self.static.items()}
             self._batches = {name: kernel for name, kernel in made.items() if kernel is not None}
             if slow := [term for name, term in self.static.items() if name not in self._batches]:
-                instead = "frames are evaluated one after the other, or by torch (docs/extend.md, An energy)"
+                instead = (
+                    "frames are evaluated one after the other, or by torch (docs/extend.md, An energy)"
+                )
                 warn_slow_path("training", "batch kernel", slow, instead)
 
     def __call__(
@@ -220,9 +225,10 @@ class PhysicsLoss:
         Args:
             x: (N, T, V, 3) [m], each frame relative to its own pelvis p.
             ahead: 2 p_{t-1} - p_{t-2} - p_t, (N, T, 3) [m].
-            planes: points and normals (N, T, S, 3) of the contact samples, or a kernel in lanes that knows
-                its planes; None leaves contact out.
-            behind: p_{t-1} - p_t, (N, T, 3) [m]; only the recipe's inertia_form `two_transitions` needs it.
+            planes: points and normals (N, T, S, 3) of the contact samples, or a kernel in lanes that
+                knows its planes; None leaves contact out.
+            behind: p_{t-1} - p_t, (N, T, 3) [m]; only the recipe's inertia_form `two_transitions` needs
+                it.
         """
         if not (self.kernels and x.dtype == torch.float32):
             return self._definitions(x, ahead, planes, behind, {})
@@ -248,10 +254,14 @@ class PhysicsLoss:
             else:
                 terms[name] = energy.energy(x).sum(-1)
         if "inertia" in self.terms and x.shape[1] >= 3:
-            terms["inertia"] = closed["inertia"] if "inertia" in closed else self._inertia(x, ahead, behind)
+            terms["inertia"] = (
+                closed["inertia"] if "inertia" in closed else self._inertia(x, ahead, behind)
+            )
         if "collision" in self.terms and planes is not None:
             terms["collision"] = (
-                self._contact.energy(x, *planes).sum(-1) if isinstance(planes, tuple) else closed["collision"]
+                self._contact.energy(x, *planes).sum(-1)
+                if isinstance(planes, tuple)
+                else closed["collision"]
             )
         return terms
 

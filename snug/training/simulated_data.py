@@ -1,14 +1,15 @@
 """Learning from simulated motions: their file, and the losses with respect to them.
 
-The file is HDF5: attribute `settings` says of what body and garment the simulations are (`settings_of`); a
-group for each motion, called by its place, has attributes `name` and `fps`, and poses (T,24,3) [rad],
+The file is HDF5: attribute `settings` says of what body and garment the simulations are (`settings_of`);
+a group for each motion, called by its place, has attributes `name` and `fps`, and poses (T,24,3) [rad],
 translations (T,3) [m] and vertices (T,V,3) [m] from the pelvis, float32.
 `python -m benchmarks.export GARMENT/training-motions` writes such a file.
 
 Two losses are distances from the simulated vertices:
 
-    vertices: mean over vertices of |x - x_simulated|^2                              [cm^2] (VertexTargets)
-    low, high: mean over vertices of |offset - simulated offset|_1 in each band      [cm]   (BandTargets)
+    vertices: mean over vertices of |x - x_simulated|^2                              [cm^2]
+    (VertexTargets) low, high: mean over vertices of |offset - simulated offset|_1 in each band      [cm]
+    (BandTargets)
 
 The first trains the supervised baseline, SNUG's own network, and Santesteban 2019; the second TailorNet.
 """
@@ -43,7 +44,9 @@ if TYPE_CHECKING:
 Trajectories = Mapping[str, np.ndarray]  # motion name -> simulated world vertices (T, V, 3) [m]
 
 DATA_SET_FORMAT = 2
-MICROMETRES = 6  # decimals of positions [m] that count: another processor may tailor the last bits otherwise
+MICROMETRES = (
+    6  # decimals of positions [m] that count: another processor may tailor the last bits otherwise
+)
 
 
 class DataSetError(ValueError):
@@ -147,12 +150,16 @@ def band_loss(predicted: Tensor, target: Tensor) -> Tensor:
 class VertexTargets:
     """Simulated vertices (F, V, 3) [m] relative to the pelvis, all frames of the set's motions in a row.
 
-    weights: skinning weights (V, J) of the prediction, on the device of the set. Raises TrainingError for a
-    motion without a fitting trajectory.
+    weights: skinning weights (V, J) of the prediction, on the device of the set. Raises TrainingError for
+    a motion without a fitting trajectory.
     """
 
     def __init__(
-        self, data: TrainingSet, motions: Sequence[Motion], trajectories: Trajectories | None, weights: Tensor
+        self,
+        data: TrainingSet,
+        motions: Sequence[Motion],
+        trajectories: Trajectories | None,
+        weights: Tensor,
     ) -> None:
         self.weights = weights
         self.vertices = relative_vertices(data.dressed, motions, trajectories).to(data.device)
@@ -174,7 +181,11 @@ class BandTargets(VertexTargets):
     """Simulated vertices, unposed and taken apart into two bands; arguments as for VertexTargets."""
 
     def __init__(
-        self, data: TrainingSet, motions: Sequence[Motion], trajectories: Trajectories | None, weights: Tensor
+        self,
+        data: TrainingSet,
+        motions: Sequence[Motion],
+        trajectories: Trajectories | None,
+        weights: Tensor,
     ) -> None:
         super().__init__(data, motions, trajectories, weights)
         vertices, transforms = self.vertices.cpu(), data.transforms.cpu()
@@ -231,7 +242,9 @@ def relative_vertices(
         TrainingError: for a missing or unfit trajectory, or a number that is not finite.
     """
     if not trajectories:
-        raise TrainingError("supervised training needs trajectories: a simulation of each training motion")
+        raise TrainingError(
+            "supervised training needs trajectories: a simulation of each training motion"
+        )
     relative = []
     for motion in motions:
         trajectory = f"simulated trajectory of motion {motion.name!r}"

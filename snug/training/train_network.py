@@ -152,7 +152,11 @@ class TrainingLoop:
     def model(self) -> TrainedModel:
         """Return the model after the steps done so far, with the best weights if it was validated."""
         trainer = self.trainer
-        summary = {**trainer.guard.summary, "epochs": trainer.epoch, "training_frames": trainer.data.frames}
+        summary = {
+            **trainer.guard.summary,
+            "epochs": trainer.epoch,
+            "training_frames": trainer.data.frames,
+        }
         if self.validator:
             if self.best:
                 trainer.network.load_state_dict(self.best)
@@ -185,8 +189,8 @@ def train_network(
 ) -> TrainedModel:
     """Train one network for a number of steps; on a CPU equal arguments give equal weights, bit for bit.
 
-    Kinds that are fitted in one go (snug.networks.fitted) take no steps: of all that concerns steps, nothing
-    is used.
+    Kinds that are fitted in one go (snug.networks.fitted) take no steps: of all that concerns steps,
+    nothing is used.
 
     Args:
         model_kind: one of snug.kinds.KINDS, which says whether energies or simulated vertices
@@ -204,7 +208,8 @@ def train_network(
         device: `cpu` or `cuda`, for the whole step.
         kernels: closed forms in numba (the default on a CPU) or the definitions of the energies in torch
             (everywhere else).
-        checkpoint: where checkpoints are written; the caller deletes the last one after storing the model.
+        checkpoint: where checkpoints are written; the caller deletes the last one after storing the
+            model.
         validation: held-out motions; the weights that do best on them are kept.
 
     Raises:
@@ -241,7 +246,9 @@ def _fitted_model(
     vertices = relative_vertices(dressed, motions, trajectories)
     weights = dressed.weights(recipe.smoothing)
     pins = dressed.garment.pins
-    network = make_network(model_kind, data.features.shape[1], dressed.vertices, recipe, seed=seed, pins=pins)
+    network = make_network(
+        model_kind, data.features.shape[1], dressed.vertices, recipe, seed=seed, pins=pins
+    )
     ready = time.perf_counter()
     network.learn(data.features, unskin_damped(vertices, data.rest, weights, data.transforms, DAMPING))
     seconds = time.perf_counter() - ready
@@ -270,9 +277,9 @@ def untrained_model(
 ) -> TrainedModel:
     """Return a network before any step, a row of the benchmark's tables.
 
-    The default recipe starts at a zero last layer, where the untrained network is skinning alone. So this one
-    keeps the random last layer of the recipe's rules: the answer of a network that has learned nothing. Input
-    statistics are those of the training motions. Without a recipe it is the kind's.
+    The default recipe starts at a zero last layer, where the untrained network is skinning alone. So this
+    one keeps the random last layer of the recipe's rules: the answer of a network that has learned
+    nothing. Input statistics are those of the training motions. Without a recipe it is the kind's.
     """
     kind = find_kind(model_kind)
     recipe = replace(recipe or kind.recipe, zero_last_layer=False)

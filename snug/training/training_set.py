@@ -1,9 +1,9 @@
 """All frames of the training motions in a row, and the sub-sequences cut from them.
 
-A cache holds a recurrent network's state after each frame, which windows start from. A window of three frames
-says nothing of the state before it. Drawn from noise alone it is unlike any state of a roll-out, and the
-network learns to shake it off; cached when the frame before last ended a window, it is that of a roll-out,
-but for what the network has learned since.
+A cache holds a recurrent network's state after each frame, which windows start from. A window of three
+frames says nothing of the state before it. Drawn from noise alone it is unlike any state of a roll-out,
+and the network learns to shake it off; cached when the frame before last ended a window, it is that of a
+roll-out, but for what the network has learned since.
 """
 
 from __future__ import annotations
@@ -124,8 +124,8 @@ class TrainingSet:
     def input_statistics(self) -> tuple[np.ndarray, np.ndarray]:
         """Return mean and spread (D,) of the inputs; for the shape numbers those of the recipe's U(-r, r).
 
-        An input that never varies gets an infinite spread: the network then never reads it, for the weights
-        behind it stay as random as they began.
+        An input that never varies gets an infinite spread: the network then never reads it, for the
+        weights behind it stay as random as they began.
         """
         mean = self.features.mean(0).cpu().numpy()
         std = self.features.std(0, correction=0).cpu().numpy()
@@ -194,8 +194,8 @@ def _reposed(
 ) -> Tensor:
     """Return the same poses on other skeletons; rotations are read from the transforms of the mean body.
 
-    Joints (24, 3) and their directions (24, 3, 10), both float64; transforms (N, T, 24, 3, 4) float32; betas
-    (N, 10) float64.
+    Joints (24, 3) and their directions (24, 3, 10), both float64; transforms (N, T, 24, 3, 4) float32;
+    betas (N, 10) float64.
     """
     joints = (template + torch.einsum("jis,ns->nji", directions, betas))[:, None]
     world = transforms[..., :3].double()
@@ -221,8 +221,8 @@ def _behind(pelvis: np.ndarray) -> Tensor:
 class HiddenStateCache:
     """States (L, F + 1, H) after each frame, zero where it never ended a window.
 
-    The last row stands for the time before a motion, when a roll-out has a state of zero. `first` (M + 1,):
-    rows at which motions begin, and the number of all frames.
+    The last row stands for the time before a motion, when a roll-out has a state of zero. `first` (M +
+    1,): rows at which motions begin, and the number of all frames.
     """
 
     def __init__(self, first: np.ndarray, shape: tuple[int, int], device: torch.device) -> None:

@@ -1,9 +1,9 @@
 """Validation on motions held out of training: full roll-outs from a state of zero.
 
-Windows see three frames at a time; a user sees roll-outs. So held-out motions are rolled out whole, and their
-mean energy a frame is the value that early stopping watches. Contact anchors are searched anew at every
-validation: those of an earlier one claim contacts that are none, by up to a fifth of the value, and the first
-validation, which has none, would look best. Nothing is random.
+Windows see three frames at a time; a user sees roll-outs. So held-out motions are rolled out whole, and
+their mean energy a frame is the value that early stopping watches. Contact anchors are searched anew at
+every validation: those of an earlier one claim contacts that are none, by up to a fifth of the value, and
+the first validation, which has none, would look best. Nothing is random.
 """
 
 from __future__ import annotations
@@ -45,7 +45,9 @@ class Validator:
     def __init__(self, trainer: Trainer, validation: Validation) -> None:
         names = {motion.name for motion in validation.motions} & set(trainer.data.names)
         if names:
-            raise TrainingError(f"motion {sorted(names)[0]!r} cannot both train and validate: leave it out")
+            raise TrainingError(
+                f"motion {sorted(names)[0]!r} cannot both train and validate: leave it out"
+            )
         if validation.every < 1 or validation.patience < 0:
             raise TrainingError("validation needs every >= 1 step and patience >= 0")
         self.trainer = trainer
@@ -62,7 +64,9 @@ class Validator:
         self.contact = trainer.contact_of(self.data)
         self.targets = None
         if not how.physics:
-            self.targets = TARGETS[how.targets](self.data, motions, validation.trajectories, trainer.weights)
+            self.targets = TARGETS[how.targets](
+                self.data, motions, validation.trajectories, trainer.weights
+            )
 
     @torch.no_grad()
     def value(self) -> float:
@@ -70,7 +74,9 @@ class Validator:
         total = 0.0
         for first, end in zip(self.data.first[:-1], self.data.first[1:]):
             # One long window, or, for a static network, windows of one frame: it has no inertia.
-            rows = np.arange(first, end).reshape((1, -1) if self.trainer.how.network.sequential else (-1, 1))
+            rows = np.arange(first, end).reshape(
+                (1, -1) if self.trainer.how.network.sequential else (-1, 1)
+            )
             total += float(torch.stack(list(self._terms(self.data.at(rows)).values())).sum())
         return total / self.data.frames
 

@@ -1,7 +1,7 @@
 """Tables of a run of this study: python audit_tables.py RUN [FOLDER]. Prints them, and writes CSV files.
 
-Table `engine_audit` has the laws that an engine violates at its default settings, and what it costs to be at
-its own limit; `engine_laws` has the errors of the laws.
+Table `engine_audit` has the laws that an engine violates at its default settings, and what it costs to be
+at its own limit; `engine_laws` has the errors of the laws.
 """
 
 from __future__ import annotations
@@ -49,7 +49,9 @@ def tables(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:
         budget, reference = (values.get((engine, law)) for law in ("budget", "reference_time"))
         default, distance = (values.get((f"{engine}/x1", law)) for law in ("time", "distance"))
         converged = values.get((f"{engine}/x{budget or 0:.0f}", "time"))
-        audit.append([engine, ", ".join(names) or "nothing", default, distance, budget, converged, reference])
+        audit.append(
+            [engine, ", ".join(names) or "nothing", default, distance, budget, converged, reference]
+        )
         laws.append([engine, *(errors.get((engine, law)) for law in LAWS)])
     heads = list(HEADS)
     laws_table = pd.DataFrame(laws, columns=[heads[0], *heads[7:]])
@@ -65,7 +67,9 @@ def markdown(table: pd.DataFrame) -> str:
     | a | 1.23 |
     """
     known = table.astype(object).where(table.notna(), "-")
-    texts = [[f"{cell:.3g}" if isinstance(cell, float) else cell for cell in row] for row in known.to_numpy()]
+    texts = [
+        [f"{cell:.3g}" if isinstance(cell, float) else cell for cell in row] for row in known.to_numpy()
+    ]
     lines = [[HEADS[head] for head in table], ["---"] * len(table.columns), *texts]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 

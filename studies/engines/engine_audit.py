@@ -1,7 +1,7 @@
 """Laws that an engine keeps whatever its energy, how far it is from its own limit, and what that costs.
 
-A violation is a result, not a failure: its row is ok and outside its tolerance. Each row names version and
-licence of the engine; one that is not installed is skipped.
+A violation is a result, not a failure: its row is ok and outside its tolerance. Each row names version
+and licence of the engine; one that is not installed is skipped.
 
 Free fall. A step that adds g h to the velocity and moves by the new velocity, as backward Euler and
 semi-implicit Euler do, has fallen g h^2 N (N + 1) / 2 after N steps; the continuous law is g t^2 / 2.
@@ -99,13 +99,14 @@ def _rms(difference: np.ndarray) -> float:
 def reaction_over_weight(run: RollOut) -> float:
     """Return the force of the pins over weight and inertia, m (g + a), in the last second.
 
-    The force is the gradient of the engine's documented energies at the pins, the pinned mass added, and a is
-    the acceleration of the centre. Both are taken from the same time steps, the last of each frame, because
-    the law is exact in every time step. Forces at the ends of frames over an acceleration from the centres of
-    frames would be wrong by 1 or 2 % where the strip bounces: 30 samples a second do not average its force.
+    The force is the gradient of the engine's documented energies at the pins, the pinned mass added, and
+    a is the acceleration of the centre. Both are taken from the same time steps, the last of each frame,
+    because the law is exact in every time step. Forces at the ends of frames over an acceleration from
+    the centres of frames would be wrong by 1 or 2 % where the strip bounces: 30 samples a second do not
+    average its force.
 
-    Without energies the force is not known, and the number is 1 + a / g, with the a between the ends of the
-    last second; it is 1 at rest.
+    Without energies the force is not known, and the number is 1 + a / g, with the a between the ends of
+    the last second; it is 1 at rest.
     """
     cloth, energies = run.specimen.cloth, run.cloth.energies
     first = len(run.positions) // 3 * 2
@@ -125,8 +126,8 @@ def reaction_over_weight(run: RollOut) -> float:
 def energy_gap(run: RollOut) -> float | None:
     """Return what the engine leaves of the decrease of its own incremental potential, in some steps [%].
 
-    0 is the minimum, found by Newton's method from the same state; 100 is the inertial guess x + h v. None
-    where energies are not documented.
+    0 is the minimum, found by Newton's method from the same state; 100 is the inertial guess x + h v.
+    None where energies are not documented.
 
     Raises:
         RuntimeError: Newton's method did not converge in one of these steps.

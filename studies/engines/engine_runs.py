@@ -59,9 +59,9 @@ def specimen(name: str) -> Specimen:
     """Return a specimen, made once.
 
     Args:
-        name: "falling", a free horizontal square of 1 m at rest; "thrown", moving along x and spinning about
-            the vertical, which stretches it; "hanging", held by two corners; "strip", a vertical strip of
-            0.25 m by 1 m held by its upper edge, without tension.
+        name: "falling", a free horizontal square of 1 m at rest; "thrown", moving along x and spinning
+            about the vertical, which stretches it; "hanging", held by two corners; "strip", a vertical
+            strip of 0.25 m by 1 m held by its upper edge, without tension.
     """
     if name == "strip":
         points, faces = rectangle("union_jack", CELLS // 4, CELLS, 0.25, 1.0)
@@ -81,7 +81,8 @@ class EngineCloth:
     """Cloth of an engine, ready to step. An adapter defines `advance`.
 
     Attributes:
-        energies: static terms that the engine minimises, gravity aside; empty where they are not documented.
+        energies: static terms that the engine minimises, gravity aside; empty where they are not
+            documented.
         explicit: forces of a time step are those at its start; otherwise those at its end.
     """
 
@@ -172,8 +173,8 @@ class RollOut:
 def roll_out(engine: Engine, sample: Specimen, factor: int = 1) -> RollOut:
     """Let an engine move a specimen with `factor` times its default budget.
 
-    Time is the processor's, so that other work on the machine does not count. All of it is done twice, and
-    the second time counts: what a roll-out needs first in a late frame compiles or loads there.
+    Time is the processor's, so that other work on the machine does not count. All of it is done twice,
+    and the second time counts: what a roll-out needs first in a late frame compiles or loads there.
 
     Raises:
         EngineDiverged: it did not come to the end.

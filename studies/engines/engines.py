@@ -2,12 +2,13 @@
 
 How the material becomes that of MuJoCo, a flex of dimension 2 with `elastic2d`:
     young, poisson, thickness    E, nu and t of the fabric: its membrane is StVK in plane stress, as here
-    bending                      that of a shell of this thickness, E t^3 / (12 (1 - nu^2)) = 0.8 uN m: softer
-                                 than SNUG's hinges, as MuJoCo takes no other
+    bending                      that of a shell of this thickness, E t^3 / (12 (1 - nu^2)) = 0.8 uN m:
+                                 softer than SNUG's hinges, as MuJoCo takes no other
     masses                       lumped as here; a pinned vertex has no degree of freedom
     damping, contact             none
-`integrator="Euler"` is MuJoCo's default and explicit in the elastic forces; "discrete" solves one linearised
-implicit step. Positions are read from `qpos`: those of `flexvert_xpos` are a step old after `mj_step`.
+`integrator="Euler"` is MuJoCo's default and explicit in the elastic forces; "discrete" solves one
+linearised implicit step. Positions are read from `qpos`: those of `flexvert_xpos` are a step old after
+`mj_step`.
 """
 
 from __future__ import annotations

@@ -9,21 +9,22 @@ How our material becomes newton's (its units are SI; tri_ and edge_ parameters a
     tri_aniso_ke    E2, E2, mu [N/m]: no Poisson effect                    Style3D
     edge_aniso_ke   k / 12 [J]: 3 l0^2 / (A1 + A2) of it is k s            Style3D
     damping, drag, lift, particle radius, contacts: 0, none
-with s = l0^2 / (4 (A1 + A2)). So VBD's membrane is stable Neo-Hookean, close to ours at small strain and not
-at large, XPBD has springs, and Style3D stretches the two axes apart from each other.
+with s = l0^2 / (4 (A1 + A2)). So VBD's membrane is stable Neo-Hookean, close to ours at small strain and
+not at large, XPBD has springs, and Style3D stretches the two axes apart from each other.
 
-The energies of VBD and XPBD are written from their sources in float64 on our stencils; Style3D's shear force
-is not the gradient of an energy. SolverVBD (evaluate_neo_hookean_membrane_force_hessian) has, per triangle of
-rest area A,
+The energies of VBD and XPBD are written from their sources in float64 on our stencils; Style3D's shear
+force is not the gradient of an energy. SolverVBD (evaluate_neo_hookean_membrane_force_hessian) has, per
+triangle of rest area A,
     E = A [mu/2 (|F|^2 - 2) + L/2 (J - a)^2] + const,  J = |f0 x f1|,  L = lambda + mu,  a = 1 + mu/L
-with tri_ke = mu and tri_ka = lambda [N/m]; its stress vanishes at rest, and its second derivatives there are
-those of StVK. Left out: its floor of 1e-10 under J. Constant chosen so that E = 0 at rest. Its bending
-(evaluate_dihedral_angle_based_bending_force_hessian) is edge_ke l0/2 theta^2: our BendHinge for
+with tri_ke = mu and tri_ka = lambda [N/m]; its stress vanishes at rest, and its second derivatives there
+are those of StVK. Left out: its floor of 1e-10 under J. Constant chosen so that E = 0 at rest. Its
+bending (evaluate_dihedral_angle_based_bending_force_hessian) is edge_ke l0/2 theta^2: our BendHinge for
 edge_ke = k s/l0.
 SolverXPBD has no triangles. Its springs (solve_springs) are constraints |d| - l0 of compliance
 1/spring_ke, whose fixed point is the minimum of inertia + sum spring_ke/2 (|d| - l0)^2. Its bending
-(bending_constraint) moves vertices along the gradient of theta times twice the area of the triangle, so it
-has no exact energy; for edge_ke = k s/(A1 + A2) it pulls as BendHinge does while triangles keep their area.
+(bending_constraint) moves vertices along the gradient of theta times twice the area of the triangle, so
+it has no exact energy; for edge_ke = k s/(A1 + A2) it pulls as BendHinge does while triangles keep their
+area.
 """
 
 from __future__ import annotations
@@ -100,7 +101,9 @@ def build_model(cloth: Cloth, solver: str) -> Any:
     import newton
 
     if cloth.rest_uv is not None:
-        raise ValueError("newton takes the rest shape from positions in space: this cloth's is a UV chart")
+        raise ValueError(
+            "newton takes the rest shape from positions in space: this cloth's is a UV chart"
+        )
     builder = newton.ModelBuilder(up_axis=newton.Axis.Y, gravity=(0.0, -GRAVITY, 0.0))
     if solver == "Style3D":
         _add_style3d(builder, cloth)
@@ -228,9 +231,9 @@ class UnequalSprings(Energy):
 class NewtonSolver(Method):
     """Method of one solver of newton on a scene without contact.
 
-    Sub-steps are those of newton's examples: a frame is not the minimum of one step of ours, and its energy
-    gap says so. Pins move evenly over the sub-steps of a frame, as in the reference. Copies into and out of
-    newton are on the clock.
+    Sub-steps are those of newton's examples: a frame is not the minimum of one step of ours, and its
+    energy gap says so. Pins move evenly over the sub-steps of a frame, as in the reference. Copies into
+    and out of newton are on the clock.
     """
 
     solver: str

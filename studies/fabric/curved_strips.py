@@ -1,11 +1,11 @@
 """Curved strips that hang from a clamp: bend-twist, on edge, and curl, about their width.
 
-Bend-twist. The test of Miller, Lazarus, Audoly and Reis (2014, doi 10.1103/PhysRevLett.112.068103) by which
-Romero et al. 2021 validate rods: one of natural curvature kappa hangs from a clamp, its tangent downwards
-there, and is planar or not, by kappa L and Gamma = w L^3 / B, w its weight per length. Here it is a strip cut
-from a flat sheet along an arc. On edge it is as good as rigid, so that its shape in the plane is the arc
-itself: theta = kappa s from the vertical, s from the clamp. A rotation phi about the tangent and psi about
-the normal twists and bends it by
+Bend-twist. The test of Miller, Lazarus, Audoly and Reis (2014, doi 10.1103/PhysRevLett.112.068103) by
+which Romero et al. 2021 validate rods: one of natural curvature kappa hangs from a clamp, its tangent
+downwards there, and is planar or not, by kappa L and Gamma = w L^3 / B, w its weight per length. Here it
+is a strip cut from a flat sheet along an arc. On edge it is as good as rigid, so that its shape in the
+plane is the arc itself: theta = kappa s from the vertical, s from the clamp. A rotation phi about the
+tangent and psi about the normal twists and bends it by
 
     tau = phi' - kappa psi,   beta = psi' + kappa phi,   phi = psi = 0 at the clamp
 
@@ -19,8 +19,8 @@ the moment on edge. The arc gives way at the smallest Gamma where this vanishes 
 straight strip that is clamped horizontally has Gamma = 12.85 (C/B)^(1/2).
 
 Curl. A round rod of natural curvature kappa leaves the plane at large kappa L and Gamma. A strip that is
-curved about its width is as good as rigid about the other axis, and its shape in the plane is stable at every
-kappa L and Gamma that docs/notebook/curled_strip.py tries. That shape is
+curved about its width is as good as rigid about the other axis, and its shape in the plane is stable at
+every kappa L and Gamma that docs/notebook/curled_strip.py tries. That shape is
 
     theta'' = Gamma (1 - s) sin theta,   theta(0) = 0, theta'(1) = kappa L
 

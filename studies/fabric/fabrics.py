@@ -5,15 +5,15 @@
 | measured.csv | a table of fabrics with a row of heads; five, spread over the bending lengths, are tested |
 | GAUGE-Dataset | a copy of GAUGE (Wang et al. 2026), of which the metadata of textiles is read |
 
-Columns of measured.csv are known by their heads, in any order; others are left alone, and a line without a
-name is called by its number:
+Columns of measured.csv are known by their heads, in any order; others are left alone, and a line without
+a name is called by its number:
 
     name, density[g/m2], bending warp[uN.m], bending weft[uN.m]
     voile, 62, 2.1, 1.4
 
-The heads of the 618 fabrics of Feng et al. 2022 (doi 10.1145/3550454.3555464) are known too. GAUGE gives mass
-per area [kg/m^2] and bending stiffness, taken as [N m] because no unit is stated. Neither is part of this
-project.
+The heads of the 618 fabrics of Feng et al. 2022 (doi 10.1145/3550454.3555464) are known too. GAUGE gives
+mass per area [kg/m^2] and bending stiffness, taken as [N m] because no unit is stated. Neither is part of
+this project.
 """
 
 from __future__ import annotations
@@ -97,8 +97,8 @@ def _snug(name: str, factor: float) -> Fabric:
     return Fabric(name, SNUG.areal_density, rigidity, rigidity)
 
 
-# SNUG's cotton by both readings of its bending term, and round numbers inside the range of measured cloth:
-# thin and thick, limp and stiff, so that an order of bending lengths is no order of weights.
+# SNUG's cotton by both readings of its bending term, and round numbers inside the range of measured
+# cloth: thin and thick, limp and stiff, so that an order of bending lengths is no order of weights.
 FABRICS = (
     isotropic("thin_limp", 0.06, 14e-3),
     isotropic("thick_limp", 0.40, 16e-3),
@@ -139,7 +139,9 @@ def read_fabrics(path: Path) -> tuple[Fabric, ...]:
     return tuple(fabrics)
 
 
-def _fabric(where: str, number: int, line: Sequence[str], columns: dict[str, tuple[int, float]]) -> Fabric:
+def _fabric(
+    where: str, number: int, line: Sequence[str], columns: dict[str, tuple[int, float]]
+) -> Fabric:
     """Return the fabric of one line. Raises DeclarationError."""
     if len(line) <= max(place for place, _ in columns.values()):
         raise DeclarationError(f"{where}: ends before its last column: give it as many cells as heads")
@@ -169,7 +171,9 @@ def read_gauge(folder: Path) -> tuple[Fabric, ...]:
     Raises:
         DeclarationError: no such file, one that is not understood, or a number out of its range.
     """
-    paths = [folder / "metadata" / "textile" / f"textile {task}.json" for task in ("stretching", "bending")]
+    paths = [
+        folder / "metadata" / "textile" / f"textile {task}.json" for task in ("stretching", "bending")
+    ]
     path = next((path for path in paths if path.is_file()), paths[-1])
     try:
         materials = json.loads(path.read_text(encoding="utf-8"))["assets"]["textile"]["material"]

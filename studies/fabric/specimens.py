@@ -1,14 +1,15 @@
 """Specimens of textile laboratories: the strip of ASTM D1388, option A, and the disc of Cusick's drapemeter.
 
-The strip overhangs by twice its bending length; the angle of its chord, read against the elastica's master
-curve (height over width against Gamma = rho_a g L^3 / D, Romero et al. 2021), gives the bending length.
+The strip overhangs by twice its bending length; the angle of its chord, read against the elastica's
+master curve (height over width against Gamma = rho_a g L^3 / D, Romero et al. 2021), gives the bending
+length.
 
 The disc is one of 30 cm that a plate of 18 cm holds at its middle (BS 5058, ISO 9073-9):
 
     DC = 100 (area of the shadow - plate) / (specimen - plate)   [%]
 
-Only the ring that overhangs is meshed, by triangles that the map r = exp keeps equilateral: there hinges are
-an isotropic plate of stiffness k/4 and Poisson's ratio -1/3 (see benchmarks.validation.plates).
+Only the ring that overhangs is meshed, by triangles that the map r = exp keeps equilateral: there hinges
+are an isotropic plate of stiffness k/4 and Poisson's ratio -1/3 (see benchmarks.validation.plates).
 """
 
 from __future__ import annotations
@@ -55,7 +56,8 @@ def bending_length(overhang: float, angle: float) -> float:
     Where the angle is outside the table, the nearest end of it is taken.
     """
     gammas, angles = master_curve()
-    # Gamma is close to a multiple of tan(angle) at small angles: the quotient is smooth enough for a line.
+    # Gamma is close to a multiple of tan(angle) at small angles: the quotient is smooth enough for a
+    # line.
     quotient = np.interp(angle, angles, np.log(gammas / np.tan(angles)))
     return overhang / float(np.exp(quotient) * np.tan(np.clip(angle, angles[0], angles[-1]))) ** (1 / 3)
 
@@ -148,7 +150,9 @@ def ring(rings: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     circle, place = np.meshgrid(np.arange(rings + 2), np.arange(around), indexing="ij")
     angle = (place + circle % 2 / 2) * 2 * np.pi / around
     radius = PLATE * np.exp((circle - 0.5) * step)
-    points = np.stack([radius * np.cos(angle), 0 * radius, -radius * np.sin(angle)], axis=-1).reshape(-1, 3)
+    points = np.stack([radius * np.cos(angle), 0 * radius, -radius * np.sin(angle)], axis=-1).reshape(
+        -1, 3
+    )
     inner = np.arange(rings + 1)[:, None] * around
     one, other = np.arange(around), (np.arange(around) + 1) % around
     a, b = inner + one, inner + other  # neighbours on the inner circle, and those outside of them
@@ -163,7 +167,8 @@ def ring(rings: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 def shadow(x: np.ndarray, faces: np.ndarray) -> float:
     """Return the area [m^2] of the shadow from above of a mesh x (V, 3) [m] and the plate, by pixels.
 
-    Layers that cover each other count once. The error is that of pixels on the border, 0.05 % of the area.
+    Layers that cover each other count once. The error is that of pixels on the border, 0.05 % of the
+    area.
     """
     pixel = 2 * HALF / PIXELS
     corners = (x[faces][:, :, [0, 2]] + HALF) / pixel - 0.5
@@ -177,6 +182,8 @@ def shadow(x: np.ndarray, faces: np.ndarray) -> float:
         u, v = np.arange(low[0], high[0])[:, None], np.arange(low[1], high[1])[None, :]
         ends = np.roll(triangle, -1, axis=0)
         sides = [(q - p)[0] * (v - p[1]) - (q - p)[1] * (u - p[0]) for p, q in zip(triangle, ends)]
-        inside = np.all([side >= 0 for side in sides], axis=0) | np.all([side <= 0 for side in sides], axis=0)
+        inside = np.all([side >= 0 for side in sides], axis=0) | np.all(
+            [side <= 0 for side in sides], axis=0
+        )
         covered[low[0] : high[0], low[1] : high[1]] |= inside
     return float(covered.sum() * pixel**2)

@@ -47,7 +47,9 @@ def test_the_weight_of_an_arc_is_that_of_shooting(curvature, stiffness_ratio, cl
     shot = brentq(lambda g: shot_arc(curvature, stiffness_ratio, clamp, g), 0.95 * gamma, 1.05 * gamma)
     assert shot == pytest.approx(gamma, rel=1e-4)
     # It is the first: the determinant keeps its sign from weightlessness on.
-    signs = [np.sign(shot_arc(curvature, stiffness_ratio, clamp, f * gamma)) for f in (0.0, 0.3, 0.6, 0.9)]
+    signs = [
+        np.sign(shot_arc(curvature, stiffness_ratio, clamp, f * gamma)) for f in (0.0, 0.3, 0.6, 0.9)
+    ]
     assert len(set(signs)) == 1
 
 

@@ -31,7 +31,17 @@ from fabrics import (
 from reference_sim import Trajectory, simulate
 from reference_sim.geometry.topology import boundary_loops
 from rest_shapes import drape, percentile
-from specimens import BENDING_LENGTH, DRAPE, PLATE, SPECIMEN, bending_length, cantilever, disc, ring, shadow
+from specimens import (
+    BENDING_LENGTH,
+    DRAPE,
+    PLATE,
+    SPECIMEN,
+    bending_length,
+    cantilever,
+    disc,
+    ring,
+    shadow,
+)
 
 HERE = Path(__file__).parent
 PUBLISHED = HERE.parents[1] / "reports" / "published" / "fabric" / "results.csv"
@@ -109,7 +119,9 @@ def test_overall_rigidity_is_the_geometric_mean():
 # --- files of a user ---------------------------------------------------------------------------------------
 
 TABLE = (
-    "name, density[g/m2], bending warp[uN.m], bending weft[uN.m]\nvoile, 62, 2.1, 1.4\ntwill 2/1, 250,30,12\n"
+    "name, density[g/m2], bending warp[uN.m], bending weft[uN.m]\n"
+    "voile, 62, 2.1, 1.4\n"
+    "twill 2/1, 250,30,12\n"
 )
 GAUGE = {
     "satin": {"density": 0.07, "bend stiffness": 1.5e-6},
@@ -161,7 +173,9 @@ def test_fabrics_beside_the_study_are_tested(tmp_path):
     gauge_at(tmp_path, json.dumps({"assets": {"textile": {"material": GAUGE}}}))
     names = {"measured/voile", "measured/twill_2_1", "gauge/satin", "gauge/oxford"}
     fabrics = {fabric.name: fabric for fabric in users_fabrics(tmp_path)}
-    assert fabrics.keys() == names and fabrics["gauge/satin"] == Fabric("gauge/satin", 0.07, 1.5e-6, 1.5e-6)
+    assert fabrics.keys() == names and fabrics["gauge/satin"] == Fabric(
+        "gauge/satin", 0.07, 1.5e-6, 1.5e-6
+    )
     assert percentile(2.0, [1.0, 3.0, 2.0, 0.5]) == 62.5
 
 
@@ -191,7 +205,9 @@ def plan(tmp_path_factory):
 
 def test_the_study_asks_for_what_was_published(plan):
     rows = pd.read_csv(PUBLISHED, low_memory=False)
-    cells = {(cell.scene.name, cell.method) for cell in plan.cells} | {(c.name, c.method) for c in plan.cases}
+    cells = {(cell.scene.name, cell.method) for cell in plan.cells} | {
+        (c.name, c.method) for c in plan.cases
+    }
     ran = rows[rows["status"] != "skipped"]
     assert set(zip(ran["scene"], ran["method"])) == cells
     assert {case.suite for case in plan.cases} == {"fabric"}

@@ -32,7 +32,11 @@ def tables(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """Return name -> table, from the rows of results.csv."""
     rows = rows[(rows["suite"] == "fabric") & rows["status"].isin(["ok", "stalled"])]
     checks = rows[rows["metric"] == "check"].set_index("scene")["value"]
-    return {"fabric_order": order_table(rows), "fabric_drape": drapes(checks), "fabric_bands": bands(checks)}
+    return {
+        "fabric_order": order_table(rows),
+        "fabric_drape": drapes(checks),
+        "fabric_bands": bands(checks),
+    }
 
 
 def drapes(checks: pd.Series) -> pd.DataFrame:
@@ -63,7 +67,9 @@ def bands(checks: pd.Series) -> pd.DataFrame:
 def order_table(rows: pd.DataFrame) -> pd.DataFrame:
     """Tabulate each method's run time of a drape, its mean errors, and the pairs that it turns round."""
     tests = {test: rows[rows["scene"].str.startswith(f"fabric/{test}/")] for test in TESTS}
-    means = {test: of_test.groupby(["method", "metric"])["value"].mean() for test, of_test in tests.items()}
+    means = {
+        test: of_test.groupby(["method", "metric"])["value"].mean() for test, of_test in tests.items()
+    }
     lines = []
     for method in tests["drape"]["method"].unique():
         line = {"method": method, "time [ms]": means["drape"].get((method, "cost/frame"))}
@@ -88,8 +94,8 @@ def order(
     """Compare the order of a method's readings with that of the reference's, by fabric.
 
     Returns:
-        Pairs that stand the other way round than by the reference, the worst first, (lower, higher) by the
-        reference; and the number of pairs that the reference tells apart and the method has.
+        Pairs that stand the other way round than by the reference, the worst first, (lower, higher) by
+        the reference; and the number of pairs that the reference tells apart and the method has.
 
     >>> order({"a": 3.0, "b": 2.0}, {"a": 1.0, "b": 9.0}, apart=1.0)
     ([('a', 'b')], 1)

@@ -26,7 +26,8 @@ DIGITS = 9  # of probed energies
 PROBED = ("hanging_sheet", "sheet_on_sphere")
 FALL = 0.12  # [m] of the probe: onto the sphere
 PATH = (0.0, 0.3, 1.0, 1.6)  # share of the fall in each frame of the probe: it accelerates
-# Of a scene: prose, places of code, and an option that no declared scene takes: its rows have no protocol.
+# Of a scene: prose, places of code, and an option that no declared scene takes: its rows have no
+# protocol.
 OUTSIDE = ("name", "description", "module", "declared_in", "files", "self_contact")
 
 

@@ -61,7 +61,9 @@ FILES = {  # a file: what is wrong with it
     METHOD_FILE.replace('"solver"', '"solver", other_mesh=True').replace("pass", FINER): "",
     **{METHOD_FILE.replace("pass", line): fault for line, fault in BREACHES.items()},
     SCENE_FILE: "",
-    SCENE_FILE.replace("-self.cloth.masses[:, None] *", TWICE): "lift: its gradient is not the derivative",
+    SCENE_FILE.replace(
+        "-self.cloth.masses[:, None] *", TWICE
+    ): "lift: its gradient is not the derivative",
     METRIC_FILE: "",
     "import numpy\n" + METRIC_FILE.replace("float(", "numpy.float32("): "",  # as a run takes it
     METRIC_FILE + JUDGED + "('diverged', 'lost')": "",
@@ -93,7 +95,9 @@ def test_the_command_names_what_is_wrong_in_a_file_and_its_remedy(number, file, 
 
 def test_a_method_is_checked_in_three_scenes_and_one_that_is_bound_to_a_mesh_where_it_is(file, capsys):
     bound = "assert scene.cloth.vertex_count == 49, 'bound to 49 vertices'"
-    assert check.main([file(METHOD_FILE.replace("self.scene = scene", f"{bound}; self.scene = scene"))]) == 1
+    assert (
+        check.main([file(METHOD_FILE.replace("self.scene = scene", f"{bound}; self.scene = scene"))]) == 1
+    )
     out = capsys.readouterr().out
     assert out.count("bound to 49 vertices") == 3 and "still in tshirt/kick: wrong" in out
 

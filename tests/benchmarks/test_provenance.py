@@ -73,7 +73,8 @@ def test_a_users_file_counts_with_the_modules_beside_it_and_all_that_is_installe
     assert list(imported_beside(str(home))) == ["deep", "helper"]
 
 
-# What tasks import and what decides no result: names, files and their formats, origin, sizes that are inputs.
+# What tasks import and what decides no result: names, files and their formats, origin, sizes that are
+# inputs.
 CARRYING = (
     "benchmarks/plan/cell.py", "benchmarks/declarations.py",
     "benchmarks/presets.py", "benchmarks/provenance.py", "benchmarks/results", "benchmarks/runner/task.py",
@@ -122,7 +123,11 @@ def test_digests_tell_values_apart():
 
     one = Pair(np.arange(3.0), "x")
     assert digest(one) == digest(Pair(np.arange(3.0), "x"))
-    others = [Pair(np.arange(3.0) + 1e-16, "y"), Pair(np.arange(3), "x"), Pair(np.arange(3.0)[:, None], "x")]
+    others = [
+        Pair(np.arange(3.0) + 1e-16, "y"),
+        Pair(np.arange(3), "x"),
+        Pair(np.arange(3.0)[:, None], "x"),
+    ]
     assert len({digest(value) for value in (one, *others)}) == 4
     with pytest.raises(TypeError, match="object"):
         digest({"a": object()})

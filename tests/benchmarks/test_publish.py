@@ -51,7 +51,9 @@ def test_a_run_that_fails_or_is_of_another_commit_is_left(tmp_path, monkeypatch,
     with pytest.raises(ResultsError, match="fall: has failed"):
         publish(fall, tmp_path, tmp_path / "kept", "abc")
     monkeypatch.setattr(command, "all_usable", lambda folder: True)
-    monkeypatch.setattr(RunFolder, "read_rows", lambda _: [SimpleNamespace(commit=c) for c in ("abc", "def")])
+    monkeypatch.setattr(
+        RunFolder, "read_rows", lambda _: [SimpleNamespace(commit=c) for c in ("abc", "def")]
+    )
     with pytest.raises(ResultsError, match="fall: rows of commit def"):
         publish(fall, tmp_path, tmp_path / "kept", "abc")
     assert not (tmp_path / "kept").exists()

@@ -63,7 +63,11 @@ COLUMN_LINE, HEAD = ",".join(COLUMNS) + "\n", "scene,method,seed,seconds,strain,
     [
         ("results.csv", None, ABSENT),
         ("results.csv", COLUMN_LINE + "1,2\n", "line 2: .*shorter"),
-        ("results.csv", COLUMN_LINE + "s,c,m,zero,x,J,1,ok,,,,,,,,,,,1,,,,,,,,,false,\n", "line 2: .*'zero'"),
+        (
+            "results.csv",
+            COLUMN_LINE + "s,c,m,zero,x,J,1,ok,,,,,,,,,,,1,,,,,,,,,false,\n",
+            "line 2: .*'zero'",
+        ),
         ("results.csv", COLUMN_LINE + "\xff\xfe", "line .*utf-8"),
         ("run.json", "{", "not readable as JSON"),
         ("run.json", '{"preset": "smoke"}', "written by an earlier version .* new folder"),

@@ -73,7 +73,11 @@ def test_a_scored_roll_out_has_the_rows_of_the_run_it_comes_from(made, tmp_path,
     # Copying is not timed.
     assert {name: metrics[name] for name in metrics.keys() & costs} == {"cost/frame": 2.5}
     row = next(row for row in scored.read_rows() if row.method == "mine" and row.metric == "cost/frame")
-    assert (row.status, row.reason, row.role) == ("ok", "declared by its author, not measured", "external")
+    assert (row.status, row.reason, row.role) == (
+        "ok",
+        "declared by its author, not measured",
+        "external",
+    )
     assert scored.read_config()["methods"]["mine"]["label"] == "mine (declared time)"
     assert numbers(scored, "reference")["energy/total"] == numbers(folder, "simulation")["energy/total"]
     assert (tmp_path / "out" / "report.pdf").stat().st_size > 1000
@@ -145,7 +149,9 @@ def test_a_pickle_that_brings_its_own_body_needs_no_scene(tmp_path, without_repo
     group.roll_outs.append(RollOut(group, find_method("newton-4"), trajectory, suites=("speed",)))
     values = measured(group.roll_outs[0])[0]
     values.pop("solver/relaxed_frames")  # which a file does not say
-    expected = {name: value.value if isinstance(value, Estimate) else value for name, value in values.items()}
+    expected = {
+        name: value.value if isinstance(value, Estimate) else value for name, value in values.items()
+    }
     assert metrics == expected and expected["energy/collision"] > 0.0 <= expected["penetration/vertices"]
     # All of it in centimetres, and nobody says so: nothing in the file contradicts it but its size.
     write(100.0)
@@ -158,7 +164,10 @@ REFUSED = {
     "no scene": (["mine.npz", "--scene", "flagg"], "did you mean flag"),
     "shape": (["mine.npz", "--scene", "flag"], "has 5 vertices, the cloth of flag 49"),
     "taken by the file": (["snug.npz", "--scene", "flag"], "snug=snug.npz: a method is called snug"),
-    "pattern": (["mine.npz", "--scene", "flag", "--reference", "r_{scene}.npz"], "r_flag.npz: no such file"),
+    "pattern": (
+        ["mine.npz", "--scene", "flag", "--reference", "r_{scene}.npz"],
+        "r_flag.npz: no such file",
+    ),
 }
 
 

@@ -71,7 +71,9 @@ def test_scores_are_those_of_a_run_without_clock_and_machine_and_the_same_bytes_
     mine = {row.metric: row for row in rows if row.method == "waving"}
     assert mine["energy/strain"].value > 0 and mine["gap/energy"].value > 0
     assert mine["cost/frame"].value == 2.5 and "declared" in mine["cost/frame"].reason
-    assert {row.protocol for row in rows} == {NUMBER} and {row.commit + row.hardware for row in rows} == {""}
+    assert {row.protocol for row in rows} == {NUMBER} and {row.commit + row.hardware for row in rows} == {
+        ""
+    }
     assert {row.method for row in rows if row.value is not None} == {"simulation", "waving"}
     for _ in range(2):
         assert main(["score", str(entry)]) == 0
@@ -94,7 +96,11 @@ def test_a_file_that_is_not_as_it_was_scored_is_refused(scored, tmp_path, name, 
         ('title = "Waving"\n', "", "title is absent: give it"),
         ("milliseconds = 2.5", "milliseconds = nan", "milliseconds = nan: give a number above 0"),
         ("{scene}.npz", "../{scene}.npz", "lies outside of the entry's folder"),
-        ("seeds = [0]", 'seeds = [0]\nscenes = ["tshirt/walk"]', "scenes = ('tshirt/walk',): choose from"),
+        (
+            "seeds = [0]",
+            'seeds = [0]\nscenes = ["tshirt/walk"]',
+            "scenes = ('tshirt/walk',): choose from",
+        ),
     ],
 )
 def test_a_fault_is_one_line_with_file_and_remedy(entry, refused, old, new, fault):

@@ -18,7 +18,8 @@ def positions_of(made):
 
 
 def work(seconds: float) -> None:
-    # By the clock that measures, and the processor's too: one that is ahead of the other ends the work early.
+    # By the clock that measures, and the processor's too: one that is ahead of the other ends the work
+    # early.
     begin, used = time.perf_counter(), time.process_time()
     while min(time.perf_counter() - begin, time.process_time() - used) < seconds:
         pass

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 class Fault:
     """One line in which `right`, at its first place in a definition, becomes `wrong`.
 
-    definition: of the line, a function, method, class or constant, as `Material.lame_mu`; of several that are
-    called so it is the only one that holds the line. No file is named: the code may move.
+    definition: of the line, a function, method, class or constant, as `Material.lame_mu`; of several that
+    are called so it is the only one that holds the line. No file is named: the code may move.
     """
 
     title: str

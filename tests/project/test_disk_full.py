@@ -61,7 +61,9 @@ def test_a_run_stops_in_one_line_and_goes_on(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(execution, "make_report", lambda log: "")
     arguments = ["smoke:speed", "--scenes", "free_fall", "--methods", "simulation", "-o"]
     folder, other = RunFolder(tmp_path / "a"), RunFolder(tmp_path / "b")
-    assert run.main([*arguments, str(other.path)]) == 0  # kernels that it compiles are files that grow, too
+    assert (
+        run.main([*arguments, str(other.path)]) == 0
+    )  # kernels that it compiles are files that grow, too
     (trajectory,) = other.path.rglob("simulation.vtkhdf")
     limit = trajectory.stat().st_size - 1000
     monkeypatch.setattr(execution, "Executor", lambda folder, assets, *_: InProcess(folder, assets))
@@ -69,7 +71,9 @@ def test_a_run_stops_in_one_line_and_goes_on(tmp_path, monkeypatch, capsys):
         status = run.main([*arguments, str(folder.path)])
     errors = capsys.readouterr().err
     (line,) = (line for line in errors.splitlines() if line.startswith("benchmarks.run: "))
-    assert status == 1 and "Traceback" not in errors and line.endswith("the same command goes on from there")
+    assert (
+        status == 1 and "Traceback" not in errors and line.endswith("the same command goes on from there")
+    )
     assert "simulation.vtkhdf: File too large" in line
     assert folder.read_config()["finished"] is None and not list(folder.path.rglob("*.part*"))
     assert run.main([*arguments, str(folder.path)]) == 0

@@ -116,7 +116,11 @@ def test_a_method_a_scene_and_a_metric_of_the_examples_run_together(user, tmp_pa
 def test_the_lines_of_python_in_the_readme_run(tmp_path, monkeypatch):
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     (code,) = [text for _, language, text in blocks(readme) if language == "python"]
-    for whole, part in (("cells=20", "cells=4"), ("pins=[0, 20]", "pins=[0, 4]"), ("frames=60", "frames=3")):
+    for whole, part in (
+        ("cells=20", "cells=4"),
+        ("pins=[0, 20]", "pins=[0, 4]"),
+        ("frames=60", "frames=3"),
+    ):
         assert whole in code
         code = code.replace(whole, part)
     monkeypatch.chdir(tmp_path)

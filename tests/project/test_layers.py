@@ -83,7 +83,9 @@ def complaints(relative: str, source: str) -> list[str]:
 
 @pytest.mark.parametrize("layer", LAYERS)
 def test_imports_follow_the_layers(layer):
-    files = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in files_of(layer)}
+    files = {
+        path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in files_of(layer)
+    }
     assert files and [wrong for file, source in files.items() for wrong in complaints(file, source)] == []
 
 
@@ -94,7 +96,11 @@ def test_imports_follow_the_layers(layer):
         ("snug/a.py", "from reference_sim import Cloth", False),
         ("snug/a.py", "from reference_sim import simulate", True),
         ("benchmarks/plan/plan.py", "from reports.build import build_report", True),
-        ("benchmarks/runner/execute_plan.py", "def f():\n    from reports.build import build_report", False),
+        (
+            "benchmarks/runner/execute_plan.py",
+            "def f():\n    from reports.build import build_report",
+            False,
+        ),
         (PURE[1], "from reference_sim import Potential", True),
         (PURE[1], "if TYPE_CHECKING:\n    from reference_sim import Obstacle", False),
     ],
@@ -111,7 +117,9 @@ DOOR = ("benchmarks.meshes", "benchmarks.validation", "reference_sim.energies", 
 def test_studies_enter_by_the_public_door_and_no_layer_imports_one():
     stubs = {layer: (ROOT / layer / "__init__.pyi").read_text() for layer in LAYERS}
     faces = {
-        f"{layer}.{name}" for layer, stub in stubs.items() for name in re.findall(r" as (\w+)$", stub, re.M)
+        f"{layer}.{name}"
+        for layer, stub in stubs.items()
+        for name in re.findall(r" as (\w+)$", stub, re.M)
     }
     for path in (path for path in STUDIES if not path.name.startswith("test_")):
         for _, name in imports_of(path.read_text(encoding="utf-8")):
@@ -124,7 +132,9 @@ def test_studies_enter_by_the_public_door_and_no_layer_imports_one():
 def modules_of(layer: str) -> dict[str, str]:
     """Module name -> source."""
     names = {path: ".".join(path.relative_to(ROOT).with_suffix("").parts) for path in files_of(layer)}
-    return {name.removesuffix(".__init__"): path.read_text(encoding="utf-8") for path, name in names.items()}
+    return {
+        name.removesuffix(".__init__"): path.read_text(encoding="utf-8") for path, name in names.items()
+    }
 
 
 def in_order(modules: Mapping[str, str], depth: int) -> list[str]:
@@ -135,7 +145,9 @@ def in_order(modules: Mapping[str, str], depth: int) -> list[str]:
     """
     graph: dict[str, set[str]] = {}
     for module, source in modules.items():
-        parts = [name.rpartition(".")[0] if name not in modules else name for _, name in imports_of(source)]
+        parts = [
+            name.rpartition(".")[0] if name not in modules else name for _, name in imports_of(source)
+        ]
         nodes = [".".join(name.split(".")[:depth]) for name in [module, *parts] if name in modules]
         graph.setdefault(nodes[0], set()).update(set(nodes) - {nodes[0]})
     if depth == 2:

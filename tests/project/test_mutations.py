@@ -1,7 +1,8 @@
 """Faults planted in the physics, one line each: the validation suite has to notice every one of them.
 
-Each fault goes into a copy of the packages in a temporary folder, whose checks run in a process of their own.
-`pytest -m slow -s tests/project/test_mutations.py` prints the table of faults and of what caught them.
+Each fault goes into a copy of the packages in a temporary folder, whose checks run in a process of their
+own. `pytest -m slow -s tests/project/test_mutations.py` prints the table of faults and of what caught
+them.
 """
 
 from __future__ import annotations
@@ -156,6 +157,8 @@ def notices(file: str, fault: Fault | None, folder: Path) -> bool:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("file", "fault"), [*((file, None) for file in METRIC_FAULTS), *OF_METRICS], ids=str)
+@pytest.mark.parametrize(
+    ("file", "fault"), [*((file, None) for file in METRIC_FAULTS), *OF_METRICS], ids=str
+)
 def test_a_fault_of_a_metric_is_noticed_and_nothing_else(file, fault, tmp_path):
     assert notices(file, fault, tmp_path) == (fault is not None)

@@ -34,7 +34,9 @@ def run(folder: Path, monkeypatch, *, slow: bool) -> dict:
     return names
 
 
-def test_the_cells_run_and_snug_is_nearer_the_simulation_than_after_a_minute(tmp_path, monkeypatch, capsys):
+def test_the_cells_run_and_snug_is_nearer_the_simulation_than_after_a_minute(
+    tmp_path, monkeypatch, capsys
+):
     names = run(tmp_path, monkeypatch, slow=False)
     energies = {name: values.mean() for name, values in names["energies"].items()}
     assert list(energies) == ["SNUG", "SNUG, a minute", "Simulation"]

@@ -7,7 +7,9 @@ from scipy.spatial import Delaunay
 from scipy.spatial.transform import Rotation
 
 
-def grid(columns: int, rows: int, *, width: float = 1.0, depth: float = 1.0) -> tuple[np.ndarray, np.ndarray]:
+def grid(
+    columns: int, rows: int, *, width: float = 1.0, depth: float = 1.0
+) -> tuple[np.ndarray, np.ndarray]:
     """Horizontal sheet of right triangles, normals up; vertex i * (rows + 1) + j is at x_i, z_j [m]."""
     i, j = np.meshgrid(np.arange(columns + 1), np.arange(rows + 1), indexing="ij")
     positions = np.stack([width * i / columns, 0.0 * i, depth * j / rows], axis=-1).reshape(-1, 3)
@@ -30,7 +32,9 @@ def random_rotation(seed: int) -> np.ndarray:
     return Rotation.random(random_state=seed).as_matrix()
 
 
-def box(low: tuple[float, float, float], high: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
+def box(
+    low: tuple[float, float, float], high: tuple[float, float, float]
+) -> tuple[np.ndarray, np.ndarray]:
     """Closed box, outward wound."""
     corner = np.array([(x, y, z) for x in (0, 1) for y in (0, 1) for z in (0, 1)])
     quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]

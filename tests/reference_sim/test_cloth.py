@@ -44,7 +44,13 @@ REFUSED = [
     ("coincident vertices", moved(3, (1, 1, 0)), KITE_FACES, {}, "vertices 2 and 3 coincide"),
     ("zero area", moved(3, (1, 0, 0)), KITE_FACES, {}, "face 1 has no rest area"),
     ("three faces at an edge", FAN, THREE, {}, "edge (0, 1) has 3 faces [0, 1, 2]"),
-    ("winding", KITE, np.array([(0, 1, 2), (0, 1, 3)]), {}, "faces 0 and 1 walk edge (0, 1) the same way"),
+    (
+        "winding",
+        KITE,
+        np.array([(0, 1, 2), (0, 1, 3)]),
+        {},
+        "faces 0 and 1 walk edge (0, 1) the same way",
+    ),
     ("pin too high", KITE, KITE_FACES, {"pins": [1, 4]}, "pins 1 to 4: give indices from 0 to 3"),
     ("shape of uv", KITE, KITE_FACES, {"rest_uv": KITE}, "rest_uv has shape (4, 3)"),
 ]

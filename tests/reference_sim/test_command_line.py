@@ -14,7 +14,11 @@ from reference_sim.command_line import announce_compilation, command
     ("name", "words", "message"),
     [
         ("snug.train", ["--no-such-option"], "--no-such-option"),
-        ("benchmarks.run", ["--body", ""], "--body '' names nothing: give a value"),  # of an unset variable
+        (
+            "benchmarks.run",
+            ["--body", ""],
+            "--body '' names nothing: give a value",
+        ),  # of an unset variable
         ("benchmarks.run", ["--body="], "'--body=' names nothing"),
     ],
 )
@@ -32,7 +36,12 @@ def test_a_wrong_word_is_one_line_with_the_name_of_the_command(
     ("met", "goes_on", "status", "message"),
     [
         (ValueError("a.obj: face 3\n has no area"), "", 2, "a.obj: face 3 has no area"),
-        (OSError(errno.ENOSPC, "No space left", "a.csv"), "--resume goes on", 1, "kept; --resume goes on"),
+        (
+            OSError(errno.ENOSPC, "No space left", "a.csv"),
+            "--resume goes on",
+            1,
+            "kept; --resume goes on",
+        ),
         (KeyboardInterrupt(), "--resume goes on", 130, "interrupted; --resume goes on"),
         (KeyboardInterrupt(), "", 130, "interrupted; nothing was written"),
     ],

@@ -63,7 +63,9 @@ def column(height: float = 1.0, radius: float = 0.1) -> tuple[np.ndarray, np.nda
     """An upright cylinder with flat ends, of rings 1 cm apart."""
     rings, around = np.linspace(-height, height, 201), 2 * np.pi * np.arange(48) / 48
     circle = radius * np.column_stack([np.cos(around), np.zeros(48), np.sin(around)])
-    vertices = [circle + np.array([0, y, 0]) for y in rings] + [np.array([[0, -height, 0], [0, height, 0]])]
+    vertices = [circle + np.array([0, y, 0]) for y in rings] + [
+        np.array([[0, -height, 0], [0, height, 0]])
+    ]
     k = np.arange(48)
     after, low = (k + 1) % 48, len(rings) * 48
     faces = [np.column_stack([np.full(48, low), k, after])]
@@ -94,7 +96,9 @@ def test_beside_the_border_of_its_faces_a_sample_meets_a_ball():
     # Just beyond them the skin goes on as the tangent, and bends away as a ball of 10 cm.
     assert at(0.003, 0.01) == pytest.approx(-0.01, abs=3e-4)
     for along, depth in ((0.01, 0.01), (0.02, 0.02), (0.03, 0.01), (0.04, 0.04)):
-        way = np.array([0.1 - depth, along])  # to the sample from the ball's far end, 10 cm below the border
+        way = np.array(
+            [0.1 - depth, along]
+        )  # to the sample from the ball's far end, 10 cm below the border
         expected = np.array([-depth, along]) @ way / np.linalg.norm(way)
         assert at(along, depth) == pytest.approx(expected, abs=3e-4)
         assert (expected < 0) == (along**2 + (depth - 0.05) ** 2 < 0.05**2)

@@ -27,7 +27,13 @@ def all_terms(pins: tuple[int, ...] = ()) -> tuple[Cloth, list[Energy], np.ndarr
     contact = ContactPenalty(cloth)
     contact.points = contact.rest_samples - [0.0, 0.0, 0.001]  # 3 mm deep at rest
     contact.normals[:] = (0.0, 0.0, 1.0)
-    terms = [StretchStVK(cloth), StretchSpring(cloth), BendHinge(cloth), Gravity(cloth), Inertia(cloth, 0.01)]
+    terms = [
+        StretchStVK(cloth),
+        StretchSpring(cloth),
+        BendHinge(cloth),
+        Gravity(cloth),
+        Inertia(cloth, 0.01),
+    ]
     crumpled = cloth.rest_positions + np.random.default_rng(1).normal(0, 0.002, x.shape)
     return cloth, [*terms, contact, AreaBarrier(cloth, threshold=1.5)], crumpled
 

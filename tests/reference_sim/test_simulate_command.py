@@ -25,7 +25,9 @@ def simulate(tmp_path, monkeypatch):
     write_obj(tmp_path / "sheet.obj", SHEET, FACES)
     write_obj(tmp_path / "sheet_cm.obj", 100 * SHEET[:, [0, 2, 1]] * [1, -1, 1], FACES)
     for frame in range(3):
-        write_obj(tmp_path / f"ball/{frame}.obj", BALL + np.array([0.01 * frame, -0.156, 0.0]), BALL_FACES)
+        write_obj(
+            tmp_path / f"ball/{frame}.obj", BALL + np.array([0.01 * frame, -0.156, 0.0]), BALL_FACES
+        )
 
     def run(words: str) -> int:
         monkeypatch.setattr(sys, "argv", ["simulate", *words.split()])

@@ -1,6 +1,7 @@
 """The loop around the steps of backward Euler: first guesses, pins, files, failures.
 
-The suite `validation` holds the steps to their exact discrete answers: fall, momenta, energy, oscillations.
+The suite `validation` holds the steps to their exact discrete answers: fall, momenta, energy,
+oscillations.
 """
 
 from __future__ import annotations
@@ -13,7 +14,14 @@ import numpy as np
 import pytest
 
 from reference_sim import GRAVITY, Cloth, Obstacle, minimise, simulate
-from reference_sim.energies import BendHinge, ContactFriction, ContactPenalty, Energy, Gravity, StretchStVK
+from reference_sim.energies import (
+    BendHinge,
+    ContactFriction,
+    ContactPenalty,
+    Energy,
+    Gravity,
+    StretchStVK,
+)
 from tests.reference_sim.meshes import box, grid
 
 SHEET, FACES = grid(6, 6, width=0.4, depth=0.4)
@@ -78,8 +86,12 @@ def test_two_runs_give_the_same_bits_also_with_the_same_terms():
 
 
 def test_divergence_is_recorded_and_not_raised():
-    poisoned = simulate(FREE, terms_of(FREE), frames=20, guess=lambda step, x: x if step < 4 else np.nan * x)
-    assert poisoned.status == "diverged" and poisoned.reason.startswith("frame 4: energy or gradient is not")
+    poisoned = simulate(
+        FREE, terms_of(FREE), frames=20, guess=lambda step, x: x if step < 4 else np.nan * x
+    )
+    assert poisoned.status == "diverged" and poisoned.reason.startswith(
+        "frame 4: energy or gradient is not"
+    )
     assert poisoned.frames == 4 and np.isfinite(poisoned.positions).all()
 
 
@@ -102,7 +114,9 @@ def test_a_step_that_round_off_excuses_says_so_in_its_frame():
     residual, relaxed = (result.frame_fields[name] for name in ("gradient_norm", "relaxed"))
     assert result.status == "converged" and result.frame_fields["converged"].all()
     assert relaxed[1:].all() and (residual[1:] > 1e-6).all()
-    assert result.reason.startswith(f"frame 1: round-off: residual {residual[1]:.1e} above tolerance 1.0e-06")
+    assert result.reason.startswith(
+        f"frame 1: round-off: residual {residual[1]:.1e} above tolerance 1.0e-06"
+    )
 
 
 @pytest.mark.parametrize(

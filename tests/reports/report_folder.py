@@ -81,7 +81,9 @@ class Stored(RollOuts):
         return self.stored
 
 
-def write_mesh(path: Path, positions: np.ndarray, faces: np.ndarray, fields: dict[str, np.ndarray]) -> None:
+def write_mesh(
+    path: Path, positions: np.ndarray, faces: np.ndarray, fields: dict[str, np.ndarray]
+) -> None:
     """A trajectory file."""
     path.parent.mkdir(parents=True, exist_ok=True)
     mesh(positions, faces, fields).save(path)

@@ -23,7 +23,9 @@ def rows_of(draw: int = 0, **factors: float):
     rows = []
     for i, scene in enumerate(SCENES):
         rows.append(row(scene, "simulation", "energy/strain", 1.0 + i))
-        rows.append(row(scene, "lbfgs-5", "energy/strain", factor["lbfgs-5"] * (1.3 + i), uncertainty=0.01))
+        rows.append(
+            row(scene, "lbfgs-5", "energy/strain", factor["lbfgs-5"] * (1.3 + i), uncertainty=0.01)
+        )
         rows.append(row(scene, "lbfgs-5", "curvature/mean", 5.0 + i, unit="1/m"))
         rows += [
             row(scene, "snug", "energy/strain", factor["snug"] * (2.0 + i) * scatter[i, seed], seed=seed)
@@ -32,7 +34,9 @@ def rows_of(draw: int = 0, **factors: float):
     timed = {"suite": "speed", "method": "lbfgs-5"}
     rows.append(row("flag", metric="cost/frame", unit="ms", value=10.0 * factor["time"], **timed))
     rows.append(row("flag", metric="cost/spread", unit="%", value=4.0, **timed))
-    rows.append(row("flag", metric="cost/frame_worst", unit="ms", value=20.0 * factor["time"] ** 3, **timed))
+    rows.append(
+        row("flag", metric="cost/frame_worst", unit="ms", value=20.0 * factor["time"] ** 3, **timed)
+    )
     check = {"suite": "validation", "method": "simulation", "metric": "check", "unit": "m"}
     return [*rows, row("sag", value=0.28, expected=0.28, tolerance=1e-3, **check)]
 
@@ -58,7 +62,9 @@ def test_what_the_uncertainty_or_2_percent_covers_is_no_change():
 
 def test_cells_of_two_protocols_are_refused():
     """A cell beside another reference is a user's own, though other rows of its run are of one protocol."""
-    own = [dataclasses.replace(r, protocol="own" if r.scene == "tshirt/bow" else "1.0") for r in rows_of()]
+    own = [
+        dataclasses.replace(r, protocol="own" if r.scene == "tshirt/bow" else "1.0") for r in rows_of()
+    ]
     frozen = [dataclasses.replace(r, protocol="1.0") for r in rows_of()]
     with pytest.raises(ResultsError, match=r"tshirt/bow x simulation: of protocol 1\.0 in A, own in B"):
         compare(run_of(frozen), run_of(own))
@@ -96,7 +102,11 @@ def test_where_zero_is_a_choice_no_change_hangs_on_it():
 
     # Patterns leave out simulation and skinning, or the total energy: the excess is of them all the same.
     moved = [("worse", "tshirt", "lbfgs-5", "relative_excess/gravity")]
-    for zero, options in ((0.0, {}), (50.0, {"methods": "lbfgs-*"}), (50.0, {"metrics": "energy/gravity"})):
+    for zero, options in (
+        (0.0, {}),
+        (50.0, {"methods": "lbfgs-*"}),
+        (50.0, {"metrics": "energy/gravity"}),
+    ):
         assert found(heights(0.0, zero), heights(0.03, zero), **options) == moved
     assert found(heights(0.0, 50.0), heights(0.015, 50.0)) == []  # 1.5 % of skinning's excess
 

@@ -53,7 +53,9 @@ def test_the_headline_is_of_the_first_garment_and_of_unseen_motions():
         ("validation", "validation"): "2 validation motions", ("validation", ""): "2 unseen motions",
     }.items():  # fmt: skip
         scenes = {name: {"role": role} for name, role in zip(SCENES, roles)}
-        assert said("How near", rows, scenes=scenes).startswith(f"On {words} the relative excess is: SNUG")
+        assert said("How near", rows, scenes=scenes).startswith(
+            f"On {words} the relative excess is: SNUG"
+        )
 
 
 def test_page_one_counts_every_kind_of_ending():
@@ -74,7 +76,9 @@ def test_page_one_counts_every_kind_of_ending():
 def test_page_one_shows_the_network_the_papers_rival_or_another_and_a_baseline():
     run = run_of(all_rows())
     assert leads(run, run.garment_rows) == ["simulation", "snug", "pbns", "skinning"]
-    mine = [dataclasses.replace(r, role="external", seeded=False) for r in on_two_scenes("mine", 3.0, 9.0)]
+    mine = [
+        dataclasses.replace(r, role="external", seeded=False) for r in on_two_scenes("mine", 3.0, 9.0)
+    ]
     alone = run_of([*BESIDE, *mine])
     assert leads(alone, alone.garment_rows) == ["simulation", "mine", "skinning"]
     assert "is: mine " in said("How near", [*BESIDE, *mine])

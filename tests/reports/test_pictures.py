@@ -121,7 +121,13 @@ def test_a_roll_out_that_ended_early_says_so_and_keeps_its_last_frame(run):
     frames = [np.asarray(frame, int) for frame in film.draw_frames(selected, 100, 25.0)]
     assert len(frames) == 5 and list(selected.labels.values()) == ["Simulation", "SNUG"]
     foot = slice(-4 * 12, -2 * 12)  # the last line of a view: letters are 12 pixels high
-    assert [(frame[foot, 100:] == film.INK[0]).any() for frame in frames] == [False, False, True, True, True]
+    assert [(frame[foot, 100:] == film.INK[0]).any() for frame in frames] == [
+        False,
+        False,
+        True,
+        True,
+        True,
+    ]
     cloth = selected.series["snug"]
     assert np.array_equal(cloth.positions[-1], film.drawn(cloth, 4, (0.0, 0.0, 0.0)).positions)
 
@@ -169,6 +175,8 @@ def test_all_cloths_are_in_sight_of_one_camera_in_every_frame():
         (["--width", "7"], "--width 64 to 2000"),
     ],
 )
-def test_what_cannot_be_filmed_is_one_line_and_status_2(run, tmp_path, monkeypatch, refused, change, hint):
+def test_what_cannot_be_filmed_is_one_line_and_status_2(
+    run, tmp_path, monkeypatch, refused, change, hint
+):
     monkeypatch.chdir(tmp_path)
     assert refused(hint, filmed, run, "x.gif", *change).startswith("reports.film: ")

@@ -36,7 +36,9 @@ def a_run(draw: int) -> list[Row]:
         rows.append(row("flag", method, "cost/frame", time, suite="speed", unit="ms"))
         rows.append(row("flag", method, "cost/spread", 3.0, suite="speed", unit="%"))
     # Of a scene without skinning, whose total is next to nothing.
-    rows += [row("fall", method, "energy/total", 5e-8, suite="speed") for method in ("simulation", "lbfgs-5")]
+    rows += [
+        row("fall", method, "energy/total", 5e-8, suite="speed") for method in ("simulation", "lbfgs-5")
+    ]
     return rows
 
 
@@ -72,7 +74,8 @@ LOST = {
 
 def fails(before: list[Row], after: list[Row]) -> bool:
     return any(
-        change.verdict in (*FAILING, "changed") for change in compare(run_of(before), run_of(after)).changes
+        change.verdict in (*FAILING, "changed")
+        for change in compare(run_of(before), run_of(after)).changes
     )
 
 

@@ -40,8 +40,12 @@ def made(tmp_path_factory) -> RunFolder:
     metadata = {"preset": "smoke", "commit": "abc", "finished": "2030-01-02T03:04:05+00:00"}
     run = run_folder(tmp_path_factory.mktemp("run"), all_rows(), **metadata)
     write_roll_outs(run, SCENES, SHOWN)
-    energies = [f"{scene},{m},0,{k / 30},{0.1 * k},0.1" for scene in SCENES for m in SHOWN for k in range(3)]
-    run.frame_energies_path.write_text("\n".join(["scene,method,seed,seconds,strain,bending", *energies, ""]))
+    energies = [
+        f"{scene},{m},0,{k / 30},{0.1 * k},0.1" for scene in SCENES for m in SHOWN for k in range(3)
+    ]
+    run.frame_energies_path.write_text(
+        "\n".join(["scene,method,seed,seconds,strain,bending", *energies, ""])
+    )
     run.figures.mkdir()
     for name in (*OLD, *KEPT):
         (run.figures / name).write_bytes(b"")
@@ -59,7 +63,9 @@ def test_table_1_is_the_mean_over_scenes(made):
     assert list(lines) == ["simulation", "skinning", "snug", "pbns"]
     for method, factor in SHOWN.items():
         for term, value in TERMS.items():
-            assert float(lines[method][f"energy/{term} [J]"]) == pytest.approx(1.5 * factor * value, rel=1e-8)
+            assert float(lines[method][f"energy/{term} [J]"]) == pytest.approx(
+                1.5 * factor * value, rel=1e-8
+            )
         assert float(lines[method]["energy/total [J]"]) == pytest.approx(1.5 * factor, rel=1e-8)
 
 

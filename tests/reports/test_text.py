@@ -31,7 +31,12 @@ RUN = run_of([row("a/b", "snug", "energy/total")])
 def small_table() -> Table:
     effect = Effect(value=1.5, scale=EXCESS, second=0.0, error=0.2, motions=20)
     mean = Mean(value=0.25, spread=0.01, seeds=3, asked=0)
-    columns = (METHOD, Column("excess", "Excess", "%"), Column("total", "Total", "J"), Column("none", "None"))
+    columns = (
+        METHOD,
+        Column("excess", "Excess", "%"),
+        Column("total", "Total", "J"),
+        Column("none", "None"),
+    )
     return Table("t", columns, (("snug", effect, mean, None), ("skinning", None, None, None)))
 
 
@@ -72,7 +77,9 @@ def test_a_number_that_was_changed_by_hand_is_found_and_mended(tmp_path, capsys)
     (tmp_path / "docs").mkdir()
     readme = tmp_path / "README.md"
     right = f"A\n{BEGIN.format('table overview of quick; method, relative_excess')}\n{part}\n{END}\nB\n"
-    readme.write_text(right.replace("| Skinning alone | 100 ", "| Skinning alone | 99 "), encoding="utf-8")
+    readme.write_text(
+        right.replace("| Skinning alone | 100 ", "| Skinning alone | 99 "), encoding="utf-8"
+    )
     assert readme.read_text(encoding="utf-8") != right
     (document,) = documents(tmp_path)
     assert document == (readme, readme.read_text(encoding="utf-8"), right)

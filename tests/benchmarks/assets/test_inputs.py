@@ -29,7 +29,9 @@ def write_body(path: Path, scale: float = 1.0) -> str:
 
 
 def test_digests_are_of_what_was_read(tmp_path):
-    one, same, other = (write_body(tmp_path / f"{n}.npz", scale) for n, scale in enumerate((1.0, 1.0, 1.1)))
+    one, same, other = (
+        write_body(tmp_path / f"{n}.npz", scale) for n, scale in enumerate((1.0, 1.0, 1.1))
+    )
     first, second, third = (read_inputs(body=Path(file)).body.digest for file in (one, same, other))
     assert first == second != third
 

@@ -85,7 +85,9 @@ def rows_beside(scene, entry) -> dict:
     fall = Trajectory(group.quasi_static + 0.01, trajectory.faces, trajectory.times)
     held = None if still is None else still.positions
     for one, made, static_answer in ((find_method("simulation"), fall, None), (entry, trajectory, held)):
-        group.roll_outs.append(RollOut(group, one, made, suites=("garments",), quasi_static=static_answer))
+        group.roll_outs.append(
+            RollOut(group, one, made, suites=("garments",), quasi_static=static_answer)
+        )
     return {name: value for name, value in measured(group.roll_outs[1])[0].items() if not np.isnan(value)}
 
 
@@ -131,7 +133,9 @@ def test_what_is_exported_is_the_scene(home):
     ):  # fmt: skip
         assert np.array_equal(written, own)
     facts = json.loads((folder / "scene.json").read_text())
-    assert facts["material"]["young_modulus"] == 70e3 and facts["energies"]["collision"]["margin_m"] == 0.004
+    assert (
+        facts["material"]["young_modulus"] == 70e3 and facts["energies"]["collision"]["margin_m"] == 0.004
+    )
     assert (facts["fps"], facts["frames"], facts["warm_up_frames"]) == (30.0, 12, 2)
     text = (folder / "README.txt").read_text()
     assert all(path.name in text for path in folder.iterdir() if path.suffix in (".npz", ".json"))
@@ -165,7 +169,9 @@ def test_energies_and_curvature_follow_from_the_exported_files_alone(home, name)
             "inertia": files.inertia(x, last, last_but_one) if frame > 1 else 0.0,
             "collision": files.collision(x, frame),
         }  # fmt: skip
-        assert energies.keys() | {"total"} == ours.keys() and (name != "sunk" or energies["collision"] > 0)
+        assert energies.keys() | {"total"} == ours.keys() and (
+            name != "sunk" or energies["collision"] > 0
+        )
         for term, value in energies.items():
             np.testing.assert_allclose(value, ours[term][frame], rtol=1e-10, err_msg=f"{term}, {frame}")
         np.testing.assert_allclose(sum(energies.values()), ours["total"][frame], rtol=1e-10)

@@ -158,7 +158,9 @@ def test_a_roll_out_that_explodes_is_a_result_and_one_of_another_motion_is_not(m
     late = carried.copy()
     late[5:] = np.inf
     roll_out_files.fit_to_scene(StoredRollOut(late), SCENE)
-    with pytest.raises(RollOutFileError, match=r"from frame 1 on its centre lies .* where the body carries"):
+    with pytest.raises(
+        RollOutFileError, match=r"from frame 1 on its centre lies .* where the body carries"
+    ):
         roll_out_files.fit_to_scene(StoredRollOut(SCENE.start - way), SCENE)
 
 
@@ -185,7 +187,11 @@ def test_an_option_says_everything_of_a_roll_out():
 
 @pytest.mark.parametrize(
     ("text", "hint"),
-    [("mine", "NAME=FILE"), ("m=a.npz,units=inch", "choose from m, cm, mm"), ("m=a.npz,ms=0", "positive")],
+    [
+        ("mine", "NAME=FILE"),
+        ("m=a.npz,units=inch", "choose from m, cm, mm"),
+        ("m=a.npz,ms=0", "positive"),
+    ],
 )
 def test_a_wrong_option_is_one_line(text, hint):
     with pytest.raises(ValueError, match=hint) as refused:

@@ -121,7 +121,9 @@ def test_every_method_gives_a_whole_trajectory_or_a_reason(name, run, scenes):
         assert outcome.status == "ok", f"{name} x {method}: {outcome.reason}"
         trajectory = trajectory_of(run, name, method)
         assert trajectory.positions.shape == (scene.frames, *scene.cloth.rest_positions.shape)
-        assert np.isfinite(trajectory.positions).all() and np.array_equal(trajectory.faces, scene.cloth.faces)
+        assert np.isfinite(trajectory.positions).all() and np.array_equal(
+            trajectory.faces, scene.cloth.faces
+        )
         seconds, result = trajectory.frame_seconds[1:], outcome.result  # as the method says
         assert (seconds > 0).all() and ("frame_p95" in result) == ("inputs" in result) == entry.timed
         if entry.timed:
@@ -172,9 +174,12 @@ def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(run, rows,
             assert not network or (values["cost/data"] > 0.0) == (method == "supervised")
         of = {r.method: r.value for r in rows if r.scene == name and r.metric == "gap/local"}
         assert of["simulation"] == pytest.approx(0.0, abs=1e-12)
-        errors = [r for r in rows if r.scene == name and r.metric == "distance/rms" and r.suite == "speed"]
+        errors = [
+            r for r in rows if r.scene == name and r.metric == "distance/rms" and r.suite == "speed"
+        ]
         twins = {r.method: r.value for r in errors if r.family == "simulation-perturbed"}
-        # So few frames do not drive two runs apart [mm]; as little is what a distance to the reference means.
+        # So few frames do not drive two runs apart [mm]; as little is what a distance to the reference
+        # means.
         assert 0.0 < twins["simulation-perturbed-1e-9"] < 1e-3
 
 
@@ -186,7 +191,9 @@ def test_a_run_that_is_done_again_gives_the_same_and_inputs_are_what_it_takes_as
     method = cell.entry.make(models=executor.folder.models_of(cell.scene.garment), seed=0)
     method.prepare(scene)
     first, again = method.run().positions, method.run().positions
-    assert np.array_equal(first, again) and np.array_equal(first, trajectory_of(run, BODY, name).positions)
+    assert np.array_equal(first, again) and np.array_equal(
+        first, trajectory_of(run, BODY, name).positions
+    )
     last = scene.frames - 1
     made = method.inputs(scene)(last)
     pose, body = made if "+" in name else (made, made)
@@ -219,7 +226,12 @@ def test_energies_of_judged_frames_are_kept_of_references_baselines_and_networks
 def test_a_roll_out_that_is_lost_is_measured_up_to_there_and_ends_no_other_ones_metrics():
     scene = small_scene("hanging_sheet", cells=4, frames=5)
     falling = np.asarray(scene.start) + 0.001 * np.arange(scene.frames)[:, None, None]
-    lost = {"simulation": (9, 0.0), "newton-1": (3, np.nan), "newton-4": (0, np.inf), "newton-8": (4, 1e200)}
+    lost = {
+        "simulation": (9, 0.0),
+        "newton-1": (3, np.nan),
+        "newton-4": (0, np.inf),
+        "newton-8": (4, 1e200),
+    }
     group = SceneRollOuts(scene, gap_samples=3)
     for method, (first, value) in lost.items():
         x = falling.copy()

@@ -119,7 +119,9 @@ def test_xpbd_finds_the_minimum_where_its_constraints_are_linear_and_nearly_else
     positions, faces = square_sheet(4, 0.2)
     cloth = Cloth(positions, faces, Material(), pins=(0, 4))
     potential = Potential([StretchStVK(cloth), Inertia(cloth, DT)])
-    velocity = 1e-6 * np.random.default_rng(4).normal(size=positions.shape) * [1, 0, 1]  # in the plane, tiny
+    velocity = (
+        1e-6 * np.random.default_rng(4).normal(size=positions.shape) * [1, 0, 1]
+    )  # in the plane, tiny
     velocity[cloth.pins] = 0.0
     guess = positions + DT * velocity
     potential.prepare(Step(positions, velocity, guess, DT))
@@ -149,7 +151,9 @@ def test_a_runaway_is_a_status(method, touching, monkeypatch):
     potential, guess = touching
     nowhere = guess.copy()
     nowhere[10] = np.nan
-    monkeypatch.setattr(potential.energies[-1], "x_hat", nowhere)  # inertia: XPBD starts from the prediction
+    monkeypatch.setattr(
+        potential.energies[-1], "x_hat", nowhere
+    )  # inertia: XPBD starts from the prediction
     result = method(potential, max_iterations=3).minimise(nowhere)
     assert result.status == "diverged" and result.reason
 

@@ -70,7 +70,10 @@ def test_every_step_is_a_minimum_within_the_handles_and_above_that_of_all_vertic
     offsets = unposed(scene, floor.positions)
     assert left_over(columns, offsets) < 1e-8 and np.abs(offsets).max() > 0.01
     potential = Potential(copied_terms(scene))
-    dressed, weight = DressedBody(scene.dressed.body, scene.dressed.garment), scene.cloth.masses.mean() * 9.81
+    dressed, weight = (
+        DressedBody(scene.dressed.body, scene.dressed.garment),
+        scene.cloth.masses.mean() * 9.81,
+    )
     weights = dressed.weights(DEFAULT.smoothing).double().numpy()
     transforms = dressed.transforms(scene.dressed.motion.poses).double().numpy()
     for frame in range(1, FRAMES):
@@ -84,7 +87,9 @@ def test_every_step_is_a_minimum_within_the_handles_and_above_that_of_all_vertic
         turns = np.einsum("vj,jik->vik", weights, transforms[frame, ..., :3])
         forces = np.einsum("vij,vi->vj", turns, potential.gradient(x))
         sizes = np.linalg.norm(columns, axis=0)
-        assert np.abs(columns.T @ forces.ravel() / sizes).max() < 2e-6 * weight * np.sqrt(columns.shape[1])
+        assert np.abs(columns.T @ forces.ravel() / sizes).max() < 2e-6 * weight * np.sqrt(
+            columns.shape[1]
+        )
         assert np.abs(forces).max() > 0.1 * weight
 
 
@@ -101,7 +106,9 @@ def test_more_handles_have_less_energy(scene, floor):
 
 def test_the_floor_of_a_network_lies_in_the_span_of_its_last_layer(scene, tmp_path):
     vertices = scene.cloth.vertex_count
-    network = make_network("pbns", 141, vertices, dataclasses.replace(DEFAULT, zero_last_layer=False), seed=0)
+    network = make_network(
+        "pbns", 141, vertices, dataclasses.replace(DEFAULT, zero_last_layer=False), seed=0
+    )
     TrainedModel("pbns", network, DEFAULT).save(model_path(tmp_path, "pbns", 0))
     floor = simulated(scene, "pbns-floor", tmp_path)
     assert floor.status == "converged"

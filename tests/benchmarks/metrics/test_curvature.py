@@ -90,7 +90,8 @@ def test_curvature_error_sees_moved_wrinkles_where_the_difference_of_means_does_
 
 
 def test_change_of_wrinkles_is_the_part_of_all_deviations_that_is_in_time():
-    # Two vertices keep 1 and 3, two of twice their area swap: of 1 + 1 + 2 + 2 about the mean of 2 the last.
+    # Two vertices keep 1 and 3, two of twice their area swap: of 1 + 1 + 2 + 2 about the mean of 2 the
+    # last.
     h = np.array([[1.0, 3.0, 1.0, 3.0], [1.0, 3.0, 3.0, 1.0]])
     area = np.array([1.0, 1.0, 2.0, 2.0]) * [[0.5], [1.5]]
     assert curvature_change(CurvatureSeries(h, area)) == pytest.approx(4.0 / 6.0)

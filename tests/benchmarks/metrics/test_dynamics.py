@@ -39,7 +39,8 @@ def test_a_sine_of_known_gain_and_lag_is_found(gain, lag):
     static = 0.7 * np.sin(2 * np.pi * 1.0 * TIME)
     moving = gain * 0.7 * np.sin(2 * np.pi * 1.0 * (TIME - lag * DT)) + 0.3
     fit = gain_and_lag(moving, static)
-    # The lagging signal does not rest before its first frame, as the fit supposes: that costs a few percent.
+    # The lagging signal does not rest before its first frame, as the fit supposes: that costs a few
+    # percent.
     assert fit[0] == pytest.approx(gain, rel=0.05)
     assert fit[1] == pytest.approx(lag, abs=0.15)
 
@@ -76,7 +77,9 @@ def test_response_takes_the_yaw_where_it_turns_and_the_displacement_where_it_shi
 
 
 def test_amplitude_and_correlation_of_phase_shifted_parts():
-    whole = 2 * np.pi * 3 * np.arange(FRAMES) / FRAMES  # three whole periods: sine and cosine are orthogonal
+    whole = (
+        2 * np.pi * 3 * np.arange(FRAMES) / FRAMES
+    )  # three whole periods: sine and cosine are orthogonal
     one = np.sin(whole)[:, None, None] * np.array([1.0, 0.0, 0.0]) * np.ones((1, 7, 1))
     other = 0.5 * np.sin(whole - 0.6)[:, None, None] * np.array([1.0, 0.0, 0.0]) * np.ones((1, 7, 1))
     assert amplitude(other, one) == pytest.approx(0.5)

@@ -1,7 +1,7 @@
 """The gap to the minimum of the own step, and the one-step errors: known answers and an oracle of its own.
 
-The oracle is dense: the step's objective in torch from the formulas, minimised by scipy. It shares no code
-with the metric nor with the simulator.
+The oracle is dense: the step's objective in torch from the formulas, minimised by scipy. It shares no
+code with the metric nor with the simulator.
 """
 
 from __future__ import annotations
@@ -43,7 +43,10 @@ class DenseStep:
             [torch.stack([(v * e).sum(1), (v * f).sum(1)], dim=1) for v in (b - a, c - a)], dim=2
         )
         self.inverse = torch.linalg.inv(flat)
-        self.lame = THICKNESS * YOUNG * POISSON / (1 - POISSON**2), THICKNESS * YOUNG / (2 * (1 + POISSON))
+        self.lame = (
+            THICKNESS * YOUNG * POISSON / (1 - POISSON**2),
+            THICKNESS * YOUNG / (2 * (1 + POISSON)),
+        )
         self.hinges, self.scale = self._hinges()
         self.free = np.setdiff1d(np.arange(len(rest)), pins)
 
@@ -182,7 +185,10 @@ def test_one_scale_serves_all_methods_of_a_scene():
 def test_a_reference_above_the_first_guess_has_no_scale_and_gaps_are_measured(scale):
     scene = small_scene("hanging_sheet", cells=4)
     x = np.array([scene.start + 0.02 * k**2 for k in range(4)])
-    assert optimality(scene, x, samples=1, scale=scale).metrics() == optimality(scene, x, samples=1).metrics()
+    assert (
+        optimality(scene, x, samples=1, scale=scale).metrics()
+        == optimality(scene, x, samples=1).metrics()
+    )
 
 
 def test_every_judged_frame_counts_and_those_of_the_warm_up_do_not():

@@ -110,7 +110,9 @@ def test_histogram_distance_is_the_shift_of_a_distribution_and_blind_to_places()
     assert histogram_distance(CurvatureSeries(h + 2.5, area), still) == pytest.approx([2.5, 2.5])
     # Two heaps against one between them: all of the area moves by 3.
     two = CurvatureSeries(np.array([[1.0, 7.0]]), np.array([[2.0, 2.0]]))
-    one = CurvatureSeries(np.array([[4.0, 99.0]]), np.array([[0.3, 0.0]]))  # boundary vertices weigh nothing
+    one = CurvatureSeries(
+        np.array([[4.0, 99.0]]), np.array([[0.3, 0.0]])
+    )  # boundary vertices weigh nothing
     assert histogram_distance(two, one) == pytest.approx([3.0])
     assert histogram_distance(CurvatureSeries(h, 0 * area), still) == pytest.approx([0.0, 0.0])
 

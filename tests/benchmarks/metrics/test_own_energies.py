@@ -62,7 +62,8 @@ def excess(scene, simulations, name, positions):
 
 
 @pytest.mark.parametrize(
-    "name", ["snug", "snug-paper", "pbns", "pbns-paper", "pbns-springs", "snug-springs", "snug-no-inertia"]
+    "name",
+    ["snug", "snug-paper", "pbns", "pbns-paper", "pbns-springs", "snug-springs", "snug-no-inertia"],
 )
 def test_the_minimiser_of_its_own_energies_leaves_a_network_no_excess(scene, simulations, name):
     entry = find_method(name)

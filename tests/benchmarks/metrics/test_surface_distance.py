@@ -45,7 +45,8 @@ def test_a_mean_is_by_area_and_not_by_vertices():
 
 
 def test_a_gap_that_one_way_cannot_see_counts_half():
-    # A half of the sheet lies on the whole one: from there to the half, x - 1/2 over one half of the area.
+    # A half of the sheet lies on the whole one: from there to the half, x - 1/2 over one half of the
+    # area.
     whole, half = right_grid(60, 60, 1.0, 1.0), right_grid(9, 9, 1.0, 0.5)
     distance = chamfer_and_angle(in_space(half[0]), half[1], in_space(whole[0]), whole[1])[0]
     assert distance == pytest.approx(0.5 * (0.0 + 0.125), rel=1e-3)
@@ -59,7 +60,9 @@ def test_a_sphere_that_turns_in_itself_has_not_moved():
     assert rms(turned[None], x[None]) > 100.0  # mm
 
 
-def roll_out(frames: np.ndarray, faces: np.ndarray, *, other_mesh: bool, obstacle: object = None) -> RollOut:
+def roll_out(
+    frames: np.ndarray, faces: np.ndarray, *, other_mesh: bool, obstacle: object = None
+) -> RollOut:
     group = SceneRollOuts(SimpleNamespace(warm_up=1, obstacle=obstacle))
     trajectory = Trajectory(frames, faces, np.arange(len(frames)) / 30.0)
     return RollOut(group, SimpleNamespace(other_mesh=other_mesh), trajectory)

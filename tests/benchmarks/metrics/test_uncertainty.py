@@ -72,7 +72,9 @@ def test_numbers_of_the_reference_are_as_uncertain_as_its_ensemble_spreads():
     ]  # fmt: skip
     uncertain_rows = with_uncertainty(rows)
     spreads = {(r.method, r.metric): r.uncertainty for r in uncertain_rows}
-    assert spreads["simulation", "energy/total"] == pytest.approx((0.0013 / 3) ** 0.5)  # of 0, 0.01, -0.03
+    assert spreads["simulation", "energy/total"] == pytest.approx(
+        (0.0013 / 3) ** 0.5
+    )  # of 0, 0.01, -0.03
     assert dict(uncertain_rows[0].moved) == pytest.approx({TWINS[0]: 0.01, TWINS[1]: -0.03})
     assert not any(r.moved for r in uncertain_rows[1:])
     assert spreads["simulation", "cost/frame"] is None and spreads["snug", "energy/total"] is None
@@ -93,7 +95,9 @@ def test_means_are_over_the_judged_frames_alone():
     late = x.copy()
     late[-1] += 0.1 * np.random.default_rng(0).normal(size=x[0].shape)
     last = grouped(scene, {"simulation": x, "newton-1": late}).roll_outs[1]
-    assert energy.measure_energy(last)["energy/strain"] > 2.0 * energy.measure_energy(one)["energy/strain"]
+    assert (
+        energy.measure_energy(last)["energy/strain"] > 2.0 * energy.measure_energy(one)["energy/strain"]
+    )
     # What ended in the warm-up has no number.
     ended = grouped(scene, {"newton-1": x[:3]}, suites=("garments",)).roll_outs[0]
     assert measured(ended) == ({}, {}, ("ok", ""))

@@ -24,7 +24,8 @@ def test_a_cell_in_two_parts_is_run_once():
     cells = planned("default:garments,speed", *TESTS).cells
     keys = [(cell.scene.name, cell.method, cell.seed) for cell in cells]
     assert len(set(keys)) == len(keys)
-    # Whole motions and their clips are scenes of their own: a part that times every solver takes the clips.
+    # Whole motions and their clips are scenes of their own: a part that times every solver takes the
+    # clips.
     assert {cell.suites for cell in cells if cell.scene.part == "clip"} == {("speed",)}
     assert {cell.suites for cell in cells if cell.scene.name == "tshirt/kick"} == {("garments",)}
     study = study_with("default:garments,speed", scenes="tshirt/kick", methods="simulation")
@@ -37,7 +38,9 @@ def test_of_whole_motions_the_first_alone_is_timed_and_all_else_is_measured_in_a
     scenes = {cell.scene.name: cell.scene for cell in planned("default:garments,speed", *TESTS).cells}
     assert scenes["tshirt/kick"].timed and not scenes["tshirt/punch"].timed
     assert scenes["tshirt/kick@clip"].timed and scenes["hanging_sheet"].timed
-    assert {m.name for m in {*measured_in(None)} - {*measured_in(scenes["tshirt/punch"].metrics)}} == {"cost"}
+    assert {m.name for m in {*measured_in(None)} - {*measured_in(scenes["tshirt/punch"].metrics)}} == {
+        "cost"
+    }
     assert scenes["tshirt/punch"].dynamic
 
 
@@ -48,7 +51,9 @@ def test_the_reference_comes_first_in_every_scene_and_only_what_has_a_seed_is_re
         if not cell.scene.networks_only:
             first.setdefault(cell.scene.name, cell.method)
     assert set(first.values()) == {"simulation"} and len(first) == 8
-    assert seeds["snug"] == seeds["untrained"] == {3, 5} and seeds["simulation"] == seeds["skinning"] == {0}
+    assert seeds["snug"] == seeds["untrained"] == {3, 5} and seeds["simulation"] == seeds["skinning"] == {
+        0
+    }
 
 
 def test_patterns_choose_scenes_methods_and_cases():

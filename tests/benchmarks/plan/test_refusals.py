@@ -17,8 +17,14 @@ FIELDS = [  # study.toml -> line, field, and what is near it
     ("split = 'tset'", "split: 'tset': choose from test, validation"),
     ("sizes = 'huge'", "sizes: unknown preset 'huge'; choose from smoke, quick, paper"),
     ("[sizes]\nbase = 'smoke'\nframe = 3", "study.toml: line 3: sizes.frame: no field is called 'frame'"),
-    ("[parts.garmnts]", "study.toml: line 1: parts.garmnts: no part is called so; choose from garments, "),
-    ("[parts.speed]\nscenes = ['flagg']", "study.toml: line 2: parts.speed.scenes: unknown scene 'flagg'"),
+    (
+        "[parts.garmnts]",
+        "study.toml: line 1: parts.garmnts: no part is called so; choose from garments, ",
+    ),
+    (
+        "[parts.speed]\nscenes = ['flagg']",
+        "study.toml: line 2: parts.speed.scenes: unknown scene 'flagg'",
+    ),
     ("garment = { units = 'cm' }", "study.toml: line 1: garment: path is absent: give it"),
     ("garment = { path = 'tshirt.obj' }", "the project has scenes of that name: give the file another"),
 ]

@@ -51,7 +51,9 @@ def test_a_study_has_its_own_fields_those_that_it_is_like_and_paths_beside_its_f
     assert list(study.parts) == ["garments", "speed", "validation", "extremes", "shapes"]
     quick = find_preset("quick")
     dependence = replace(quick.dependence, frames=3)
-    assert study.sizes == replace(quick, frames=60, steps={**quick.steps, "snug": 7}, dependence=dependence)
+    assert study.sizes == replace(
+        quick, frames=60, steps={**quick.steps, "snug": 7}, dependence=dependence
+    )
     assert study.garment.path == mine / "shirt.obj" and study.garment.shift == (0.0, 0.1, 0.0)
     assert study.rollouts["theirs"].path == str(mine / "out/{scene}.npz")
     assert (study.rollouts["others"].units, study.rollouts["others"].ms) == ("cm", 2.5)

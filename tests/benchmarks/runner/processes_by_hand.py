@@ -117,7 +117,9 @@ def finish(folder: Path, *tasks: Task, address: str = "", workers: int = 1, **op
 def together(folder: Path, *batches: list[Task], address: str = "") -> dict[str, Outcome]:
     left, doing = [(batch, {}) for batch in reversed(batches)], executor(folder, address)
     try:
-        return {task.name: outcome for task, outcome in doing.together(lambda: left.pop() if left else None)}
+        return {
+            task.name: outcome for task, outcome in doing.together(lambda: left.pop() if left else None)
+        }
     finally:
         doing.close()
 

@@ -47,7 +47,9 @@ def thirds(positions: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.nda
     return np.concatenate([positions, positions[:, faces].mean(axis=2)], axis=1), np.concatenate(split)
 
 
-def dressed_scene(motion: str, garment: str = "tshirt", *, part: str = "whole", preset: Preset | None = None):
+def dressed_scene(
+    motion: str, garment: str = "tshirt", *, part: str = "whole", preset: Preset | None = None
+):
     """The declaration of a body in a garment."""
     return of_garment(garment).scene(motion, part).at(preset or find_preset("smoke"))
 
@@ -57,7 +59,9 @@ def assets_of(dressed, motion) -> Assets:
     return Assets(dressed.body, {"tshirt": dressed.garment}, {motion.name: motion}, {})
 
 
-def training(name: str, *motions: str, steps: int, key: str = "0", device: str = "cpu") -> NetworkTraining:
+def training(
+    name: str, *motions: str, steps: int, key: str = "0", device: str = "cpu"
+) -> NetworkTraining:
     """The training of a network of the T-shirt."""
     simulated = name in TRAININGS and TRAININGS[name].simulated
     return NetworkTraining(

@@ -48,7 +48,10 @@ def test_a_run_on_a_cluster_is_that_of_this_machine(tmp_path, monkeypatch):
         rows = [row for row in folder.read_rows() if not row.metric.startswith("cost/")]
         weights = read_tensors(folder.models / "supervised-seed0.safetensors")[0]
         return (
-            {(row.scene, row.method, row.metric): (row.value, row.uncertainty, row.status) for row in rows},
+            {
+                (row.scene, row.method, row.metric): (row.value, row.uncertainty, row.status)
+                for row in rows
+            },
             {name: tensor.numpy().tobytes() for name, tensor in weights.items()},
         )
 
@@ -66,7 +69,9 @@ def test_a_worker_of_other_software_or_without_the_folder_ends_the_run_in_one_li
 
     with Dask(tmp_path, 1) as started:
         with monkeypatch.context() as patch:
-            patch.setattr(scheduler, "software_of", lambda task: software_of(task) | {"package numpy": "1.0"})
+            patch.setattr(
+                scheduler, "software_of", lambda task: software_of(task) | {"package numpy": "1.0"}
+            )
             other = r"^worker tcp:.*\(package numpy\); install the same there as here"
             with pytest.raises(RunStopped, match=other):
                 together(folder, [task("one")], address=started.address)
@@ -85,7 +90,9 @@ def test_where_nobody_answers_and_without_dask_the_remedy_is_said(monkeypatch):
         scheduler.check_scheduler("tcp://127.0.0.1:1")
 
 
-@pytest.mark.parametrize(("field", "value"), [("device", "cuda"), ("rollouts", {"mine": {"path": "a.npz"}})])
+@pytest.mark.parametrize(
+    ("field", "value"), [("device", "cuda"), ("rollouts", {"mine": {"path": "a.npz"}})]
+)
 def test_what_a_cluster_cannot_do_is_refused(field, value, tmp_path, monkeypatch):
     monkeypatch.setattr("snug.training.device.find_device", lambda name: None)
     with pytest.raises(StudyError, match=f"{field}: .*leave out --scheduler"):

@@ -128,12 +128,16 @@ def test_a_network_learns_from_given_motions_and_from_the_clips_that_are_there(t
 
 
 def test_the_same_simulations_serve_every_seed_and_training(tmp_path, monkeypatch):
-    mine = dataclasses.replace(TRAININGS["tailornet"], simulated=Simulated(mixed=2, method="fast-lbfgs-10"))
+    mine = dataclasses.replace(
+        TRAININGS["tailornet"], simulated=Simulated(mixed=2, method="fast-lbfgs-10")
+    )
     monkeypatch.setitem(TRAININGS, "tailornet", mine)
     more = dataclasses.replace(TRAININGS["supervised"], simulated=Simulated(mixed=3))
     monkeypatch.setitem(TRAININGS, "supervised", more)
     scene, names = dressed_scene("kick"), ("supervised", "santesteban2019", "tailornet", "snug")
-    cells = tuple(Cell(scene, find_method(name), seed, ("garments",)) for name in names for seed in (0, 1))
+    cells = tuple(
+        Cell(scene, find_method(name), seed, ("garments",)) for name in names for seed in (0, 1)
+    )
     plan = plan_of(tmp_path, motions=Motions(train=("walk", "run"), test=("kick",)), cells=cells)
     tasks = [task for task in tasks_of(plan) if task.stage == "ground truth"]
     labels = [task.label for task in tasks]

@@ -33,7 +33,9 @@ RAN = Outcome(result={"seconds": 1.0, "frames": 4, "peak": 70.0, "terms": "strai
 
 def plan_with(folder: Path, *methods: str, **changes) -> Plan:
     """A plan of these methods in a scene of the T-shirt."""
-    cells = tuple(Cell(dressed_scene("kick", preset=FEW), find_method(m), 0, ("garments",)) for m in methods)
+    cells = tuple(
+        Cell(dressed_scene("kick", preset=FEW), find_method(m), 0, ("garments",)) for m in methods
+    )
     motions = Motions(train=("walk",), test=("kick",))
     return plan_of(folder, **{"cells": cells, "motions": motions, "preset": FEW} | changes)
 
@@ -107,7 +109,9 @@ def test_a_run_from_files_simulates_and_trains_nothing_but_a_users_own(made, tmp
         "tshirt/untrained-seed0": "training", "tshirt/mine-seed0": "training",
     }  # fmt: skip
     assert "data" not in {task.kind for task in tasks}
-    assert "data" in {task.kind for task in tasks_of(plan_with(tmp_path, "pbns", "supervised", "untrained"))}
+    assert "data" in {
+        task.kind for task in tasks_of(plan_with(tmp_path, "pbns", "supervised", "untrained"))
+    }
 
 
 def test_every_row_of_a_pretrained_network_says_so(made, tmp_path):

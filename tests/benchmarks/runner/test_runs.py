@@ -99,7 +99,9 @@ def run_dressed(folder: Path) -> dict:
     """Run the command into `folder` and return its rows without costs and measured times."""
     assert run.main([*DRESSED, "-o", str(folder)]) == 0
     rows = RunFolder(folder).read_rows()
-    kept = [row for row in rows if not row.metric.startswith("cost/") and row.unit not in ("s", "ms", "MB")]
+    kept = [
+        row for row in rows if not row.metric.startswith("cost/") and row.unit not in ("s", "ms", "MB")
+    ]
     return {(r.method, r.metric, r.seed): (r.value, r.status, r.reason, r.uncertainty) for r in kept}
 
 

@@ -13,7 +13,9 @@ from reference_sim.trajectory import write_obj
 from tests.benchmarks.runner.tasks_by_hand import small_scene
 
 SHEET = small_scene("hanging_sheet", cells=4, frames=5)
-STANDING = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.2, 0.0, 0.3], [0.2, 1.7, 0.1]])  # [m], head last
+STANDING = np.array(
+    [[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.2, 0.0, 0.3], [0.2, 1.7, 0.1]]
+)  # [m], head last
 TETRAHEDRON = np.array([[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]])
 
 

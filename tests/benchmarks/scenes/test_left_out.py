@@ -38,5 +38,7 @@ def test_solvers_of_a_dressed_body_load_no_network_library(tmp_path):
     given = (assets, assets.posed_body(motion)[:4], scene.start, motion.cut(0, 4))
     path.write_bytes(pickle.dumps(given))
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
-    modules = subprocess.check_output([sys.executable, "-c", DRESSED, str(path)], text=True, env=environment)
+    modules = subprocess.check_output(
+        [sys.executable, "-c", DRESSED, str(path)], text=True, env=environment
+    )
     assert "reference_sim.obstacle" in modules.split() and not NETWORKS & {*modules.split()}

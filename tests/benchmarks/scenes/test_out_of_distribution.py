@@ -66,10 +66,14 @@ def test_what_is_hard_about_each(assets):
     assert np.array_equal(made["walk_x4"].poses, walk.poses[::4])
     plain, wrong = hard_motions.ordinary(walk), hard_motions.GLITCH
     jump = made["root_glitch"].translations - plain.translations
-    assert np.flatnonzero(jump.any(axis=1)).tolist() == [wrong] and np.linalg.norm(jump) == pytest.approx(1.0)
+    assert np.flatnonzero(jump.any(axis=1)).tolist() == [wrong] and np.linalg.norm(jump) == pytest.approx(
+        1.0
+    )
     flip = np.argwhere((made["limb_glitch"].poses != plain.poses).any(axis=2))
     assert flip.tolist() == [[wrong, JOINT["left_shoulder"]]]
-    turned = [rotation_matrices(m.poses[wrong, JOINT["left_shoulder"]]) for m in (plain, made["limb_glitch"])]
+    turned = [
+        rotation_matrices(m.poses[wrong, JOINT["left_shoulder"]]) for m in (plain, made["limb_glitch"])
+    ]
     assert np.trace(turned[0].T @ turned[1]) == pytest.approx(-1.0)  # half a turn
     joints = joint_positions(made["splits"].poses, made["splits"].translations)[-1]
     ankles = joints[JOINT["left_ankle"]] - joints[JOINT["right_ankle"]]
@@ -150,7 +154,9 @@ def test_a_network_whose_shirt_is_on_no_body_has_diverged(roll_outs, tmp_path, m
     x = free.positions.copy()
     x[3, 7, 0] += far
     whole = bool(np.isfinite(far))
-    roll_out = RollOut(free.group, find_method(method), trajectory_of(free.scene, x), suites=("extremes",))
+    roll_out = RollOut(
+        free.group, find_method(method), trajectory_of(free.scene, x), suites=("extremes",)
+    )
     roll_out.counterpart = free.counterpart
     free.group.roll_outs.append(roll_out)
     values, _, ended = measured(roll_out, ("extrapolation",))
@@ -174,4 +180,7 @@ def test_the_task_of_the_settled_shirt_that_serves_all_comes_unasked():
     starts = {task.name: task for task in tasks_of(plan) if task.kind == "start"}
     ordinary, splits = "out_of_distribution-ordinary", "out_of_distribution-splits"
     assert list(starts) == [ordinary, splits, "out_of_distribution-girth_+5"]
-    assert starts[splits].needs == (("start", ordinary),) and not starts["out_of_distribution-girth_+5"].needs
+    assert (
+        starts[splits].needs == (("start", ordinary),)
+        and not starts["out_of_distribution-girth_+5"].needs
+    )

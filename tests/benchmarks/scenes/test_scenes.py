@@ -43,7 +43,9 @@ def test_a_body_of_another_shape_wears_the_garment_of_the_mean_one(monkeypatch):
         assert np.array_equal(getattr(mean.cloth, of_rest), getattr(other.cloth, of_rest))
     assert mean.dressed.betas is None and np.array_equal(other.dressed.betas, betas)
     motion = other.dressed.motion
-    assert np.array_equal(other.obstacle.at(3), body.vertices(motion.poses, motion.translations, betas)[3])
+    assert np.array_equal(
+        other.obstacle.at(3), body.vertices(motion.poses, motion.translations, betas)[3]
+    )
     assert other.origin_heights[2] == body.joints(betas)[0, 1] + motion.translations[2, 1]
 
     starts = []
@@ -65,7 +67,9 @@ def test_an_own_body_wears_the_garment_and_makes_stale_what_was_on_another(tmp_p
     path = write_body(tmp_path / "tall.npz", 1.1)
     plans = [planned("full:garments", "--methods", "snug", *more) for more in ((), ("--body", path))]
     for one, other in zip(*map(tasks_of, plans)):
-        assert one.kind not in ("network", "cell") or dependencies(one, {}) != dependencies(other, {}), one.id
+        assert one.kind not in ("network", "cell") or dependencies(one, {}) != dependencies(other, {}), (
+            one.id
+        )
     heights = []
     for plan in plans:
         assets = open_assets(TINY, [make_motion("walk")], ["tshirt"], inputs=plan.inputs)

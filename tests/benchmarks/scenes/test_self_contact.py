@@ -32,7 +32,9 @@ def pressed_together():
     x, faces = grid(3, 3, width=0.06, depth=0.06)
     above = x[:, [2, 1, 0]] * [0.8, 1, 0.9] + np.array([5e-3, 3e-3, 7e-3])
     start = np.concatenate([x, above])
-    cloth = Cloth(start, np.concatenate([faces, faces[:, ::-1] + len(x)]), Material(), pins=[0, 3, 12, 15])
+    cloth = Cloth(
+        start, np.concatenate([faces, faces[:, ::-1] + len(x)]), Material(), pins=[0, 3, 12, 15]
+    )
     thrown = np.zeros_like(start)
     thrown[len(x) :] = [0.1, -0.3, 0.05]
     energies = (StretchStVK(cloth), BendHinge(cloth), Gravity(cloth))
@@ -42,7 +44,9 @@ def pressed_together():
     )  # fmt: skip
 
 
-def test_solvers_that_stop_early_know_no_self_contact_and_the_last_runs_pairs_are_forgotten(pressed_together):
+def test_solvers_that_stop_early_know_no_self_contact_and_the_last_runs_pairs_are_forgotten(
+    pressed_together,
+):
     stopped = Simulation(options={"max_iterations": 2, "method": "newton"})
     stopped.prepare(pressed_together)
     assert "energy/barrier" not in stopped.run().frame_fields
@@ -70,11 +74,19 @@ def test_another_material_is_minimised_beside_the_barrier(exchange, pressed_toge
 
 def test_the_option_makes_it_the_ground_truth_of_dressed_scenes(monkeypatch):
     study = study_with(
-        scenes=["tshirt/kick", "flag"], methods=["simulation", "snug"], split="validation", self_contact=True
+        scenes=["tshirt/kick", "flag"],
+        methods=["simulation", "snug"],
+        split="validation",
+        self_contact=True,
     )
     plan = make_plan(study)
-    assert {scene.name: scene.self_contact for scene in plan.scenes} == {"tshirt/kick": True, "flag": False}
-    assert of_garment("tshirt", plan.motions.worn).scene("walk").self_contact  # of what networks learn from
+    assert {scene.name: scene.self_contact for scene in plan.scenes} == {
+        "tshirt/kick": True,
+        "flag": False,
+    }
+    assert (
+        of_garment("tshirt", plan.motions.worn).scene("walk").self_contact
+    )  # of what networks learn from
     of_kick, *_ = (cell for cell in plan.cells if cell.scene.dressed and cell.method == "simulation")
     assert protocol_of(of_kick, plan) == OWN  # another reference than that of the protocol
     without = make_plan(dataclasses.replace(study, self_contact=False))

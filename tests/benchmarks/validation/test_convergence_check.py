@@ -45,7 +45,9 @@ def test_the_truth_passes(solved):
         (lambda guess, x: np.where((VERTEX == 0) | (VERTEX == 8), x, 3 * guess), "stalled", "rose"),
     ],
 )
-def test_a_minimiser_that_lies_is_caught_by_what_the_suite_runs(solved, monkeypatch, claimed, status, words):
+def test_a_minimiser_that_lies_is_caught_by_what_the_suite_runs(
+    solved, monkeypatch, claimed, status, words
+):
     potential, guess, result = solved
     lie = claiming(claimed(guess, result.positions), status)
     monkeypatch.setattr(convergence_check.sim, "minimise", lambda potential, x0, **options: lie)
@@ -61,7 +63,9 @@ def test_a_saddle_called_converged_is_found():
 
 def test_a_saddle_far_below_the_stiffness_of_the_membrane_is_found():
     """A flat sheet pressed by a hair: the curvature that makes it buckle is far below the membrane's own."""
-    potential, guess = sheet_step(gravity=0.0, speed=0.0, start="flat", dt=None, bending=2e-5, pins="side")
+    potential, guess = sheet_step(
+        gravity=0.0, speed=0.0, start="flat", dt=None, bending=2e-5, pins="side"
+    )
     flat = np.where(potential.cloth.free[:, None], guess * [0.99999, 1.0, 0.99999], guess)
     truth = optimality_of(potential, flat)
     assert -1e-2 < truth.lowest_curvature < -truth.zero_curvature

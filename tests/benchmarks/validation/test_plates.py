@@ -46,7 +46,11 @@ def test_equilateral_triangles_are_a_plate_of_kirchhoff(shape, terms, nu):
 # Energies over k of folds about y and about a diagonal, and of a twist: no isotropic plate has such.
 @pytest.mark.parametrize(
     ("family", "fold", "diagonal_fold", "twist"),
-    [("right", 1 / 8, 3 / 8, 3 / 4), ("cross", 1 / 6, 5 / 48, 1 / 4), ("union_jack", 5 / 48, 1 / 6, 1 / 2)],
+    [
+        ("right", 1 / 8, 3 / 8, 3 / 4),
+        ("cross", 1 / 6, 5 / 48, 1 / 4),
+        ("union_jack", 5 / 48, 1 / 6, 1 / 2),
+    ],
 )
 def test_other_triangles_are_stiffer_in_some_directions(family, fold, diagonal_fold, twist):
     energies = [

@@ -19,7 +19,8 @@ from benchmarks.validation.registry import STRESS_TESTS
 from reference_sim import minimise
 
 CASES = [
-    pytest.param(case, id=case.name, marks=[] if case.smoke else [pytest.mark.slow]) for case in STRESS_TESTS
+    pytest.param(case, id=case.name, marks=[] if case.smoke else [pytest.mark.slow])
+    for case in STRESS_TESTS
 ]
 
 
@@ -77,4 +78,8 @@ def test_a_step_that_nobody_chose_is_no_lie_either(seeds):
     """Claims are checked from the definitions, contact included; a failure has to be said."""
     for seed in seeds:
         row = solve_sheet(**drawn(seed))
-        assert row.status in ("ok", "stalled", "timeout", "diverged") and row.reason, (seed, drawn(seed), row)
+        assert row.status in ("ok", "stalled", "timeout", "diverged") and row.reason, (
+            seed,
+            drawn(seed),
+            row,
+        )

@@ -21,7 +21,12 @@ from tests.benchmarks.plan.planned import planned
 def test_a_known_answer_is_found(case):
     row = case.run()
     assert row.status == "ok", row.reason
-    assert (row.suite, row.scene, row.method, row.metric) == ("validation", case.name, "simulation", "check")
+    assert (row.suite, row.scene, row.method, row.metric) == (
+        "validation",
+        case.name,
+        "simulation",
+        "check",
+    )
 
 
 def test_study_smoke_runs_the_quick_ones_unless_one_is_named():

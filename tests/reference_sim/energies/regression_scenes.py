@@ -2,11 +2,11 @@
 
     python -m tests.reference_sim.energies.regression_scenes
 
-writes the table anew. A change in it is a change of physics or of the minimum that the solver finds: look at
-every line of the difference, and say in the commit why it had to be.
+writes the table anew. A change in it is a change of physics or of the minimum that the solver finds: look
+at every line of the difference, and say in the commit why it had to be.
 
-Every term of the simulator is in one of them. Each is solved to a tolerance at which the energies are known
-to nine digits, and is short enough that round-off does not grow into another wrinkle.
+Every term of the simulator is in one of them. Each is solved to a tolerance at which the energies are
+known to nine digits, and is short enough that round-off does not grow into another wrinkle.
 """
 
 from __future__ import annotations

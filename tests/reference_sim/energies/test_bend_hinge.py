@@ -45,7 +45,9 @@ def test_the_arctangent_of_the_kernels_is_that_of_numpy():
     """All around the circle, near its axes and diagonals, at any size."""
     generator = np.random.default_rng(4)
     angles = np.concatenate([generator.uniform(-np.pi, np.pi, 20_000), np.pi / 8 * np.arange(-7, 8)])
-    angles = np.concatenate([angles, angles[-15:] + 1e-9, angles[-15:] - 1e-9, 10.0 ** np.arange(-300, 0, 7)])
+    angles = np.concatenate(
+        [angles, angles[-15:] + 1e-9, angles[-15:] - 1e-9, 10.0 ** np.arange(-300, 0, 7)]
+    )
     size = 10 ** generator.uniform(-100, 100, len(angles))
     y, x = size * np.sin(angles), size * np.cos(angles)
     y[-5:], x[-5:] = [0.0, -0.0, 0.0, 1.0, -1.0], [1.0, 1.0, -1.0, 0.0, 0.0]

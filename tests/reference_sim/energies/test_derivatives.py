@@ -1,7 +1,7 @@
 """Every energy where nothing is symmetric: closed forms against automatic differentiation.
 
-The reference is the definition (`element_energy`, in torch) through the base class. An energy without a line
-in CASES is found by the last test.
+The reference is the definition (`element_energy`, in torch) through the base class. An energy without a
+line in CASES is found by the last test.
 """
 
 from __future__ import annotations
@@ -214,7 +214,9 @@ def test_inertia_takes_a_target_per_frame():
     energy.x_hat = x_hat[1].numpy()
     value, gradient = energy.value_and_gradient(x[1].numpy())
     assert value == pytest.approx(exact[1].sum(), rel=1e-13)
-    assert gradient == pytest.approx(cloth.masses[:, None] / 0.02**2 * (x[1] - x_hat[1]).numpy(), rel=1e-13)
+    assert gradient == pytest.approx(
+        cloth.masses[:, None] / 0.02**2 * (x[1] - x_hat[1]).numpy(), rel=1e-13
+    )
 
 
 def test_contact_takes_planes_per_frame():

@@ -1,7 +1,7 @@
 """Energies against answers that share no code with them, beyond those of the suite `validation`.
 
-Its cases hold the membrane to scikit-fem's assembly and to closed forms, folded hinges to theirs, and both to
-rigid motions: `pytest tests/benchmarks/validation/test_validation.py` runs them.
+Its cases hold the membrane to scikit-fem's assembly and to closed forms, folded hinges to theirs, and
+both to rigid motions: `pytest tests/benchmarks/validation/test_validation.py` runs them.
 """
 
 from __future__ import annotations

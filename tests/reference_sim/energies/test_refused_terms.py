@@ -8,7 +8,14 @@ import numpy as np
 import pytest
 
 from reference_sim import Cloth
-from reference_sim.energies import AreaBarrier, ContactFriction, ContactPenalty, Energy, Inertia, StretchStVK
+from reference_sim.energies import (
+    AreaBarrier,
+    ContactFriction,
+    ContactPenalty,
+    Energy,
+    Inertia,
+    StretchStVK,
+)
 from tests.reference_sim.meshes import grid
 
 SHEET = Cloth(*grid(3, 3, width=0.1, depth=0.1))
@@ -36,10 +43,14 @@ def test_another_definition_states_where_its_derivatives_come_from(parent):
     def halved(self, u):
         return 0.5 * parent.element_energy(self, u)
 
-    with pytest.raises(TypeError, match=r"Half would inherit closed forms of another energy: write ") as told:
+    with pytest.raises(
+        TypeError, match=r"Half would inherit closed forms of another energy: write "
+    ) as told:
         type("Half", (parent,), {"element_energy": halved})
     lines = re.findall(r"(\w+) = Energy\.(\w+)", str(told.value))
-    Half = type("Half", (parent,), {"element_energy": halved, **{a: getattr(Energy, b) for a, b in lines}})
+    Half = type(
+        "Half", (parent,), {"element_energy": halved, **{a: getattr(Energy, b) for a, b in lines}}
+    )
     whole, half = parent(SHEET), Half(SHEET)
     if parent is ContactPenalty:
         whole.points = half.points = whole.sample_matrix @ bent + [0.0, 1e-3, 0.0]

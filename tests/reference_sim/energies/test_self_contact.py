@@ -144,7 +144,9 @@ def test_pins_push_cloth_before_them():
     paddle = np.arange(len(x), len(both))
     cloth = Cloth(both, np.concatenate([faces, more + len(x)]), Material(), pins=paddle)
     terms = [StretchStVK(cloth), BendHinge(cloth), ContactBarrier(cloth)]
-    push = simulate(cloth, terms, frames=3, pin_positions=lambda frame: both[paddle] - [0, 0.03 * frame, 0])
+    push = simulate(
+        cloth, terms, frames=3, pin_positions=lambda frame: both[paddle] - [0, 0.03 * frame, 0]
+    )
     assert push.status == "converged", push.reason
     assert free(push, cloth)
     assert np.array_equal(push.positions[-1][paddle], both[paddle] - [0, 0.06, 0])
@@ -158,7 +160,9 @@ def test_pins_that_find_no_way_stop_and_say_so():
     cloth = Cloth(cloth.rest_positions, cloth.faces, Material(), pins=np.arange(cloth.vertex_count - 1))
     down = np.where(np.arange(cloth.vertex_count - 1) < lower, 0.0, -0.01)[:, None] * [0, 1, 0]
     terms = [StretchStVK(cloth), BendHinge(cloth), ContactBarrier(cloth)]
-    driven = simulate(cloth, terms, frames=2, pin_positions=lambda f: cloth.rest_positions[:-1] + f * down)
+    driven = simulate(
+        cloth, terms, frames=2, pin_positions=lambda f: cloth.rest_positions[:-1] + f * down
+    )
     assert driven.status == "stalled" and "no way without intersection: pins came" in driven.reason
     assert free(driven, cloth)
 

@@ -83,7 +83,11 @@ def test_an_official_body_of_python_2_is_read(tmp_path):
     shapes = np.linspace(-1, 1, 12).reshape(2, 3, 2)
     dirty = b"U\x0b_dirty_varsc__builtin__\nset\n]\x85Rub"
     chumpy = b"cchumpy.ch\nCh\n)\x81}(U\x01x" + python2(shapes) + dirty
-    parts = {b"data": np.ones(2), b"indices": np.array([1, 0], "<i4"), b"indptr": np.array([0, 1, 2], "<i4")}
+    parts = {
+        b"data": np.ones(2),
+        b"indices": np.array([1, 0], "<i4"),
+        b"indptr": np.array([0, 1, 2], "<i4"),
+    }
     sparse = b"ccopy_reg\n_reconstructor\n(cscipy.sparse.csc\ncsc_matrix\nc__builtin__\nobject\nNtR}("
     sparse += b"".join(b"U" + bytes([len(key)]) + key + python2(value) for key, value in parts.items())
     sparse += b"U\x06_shapeK\x03K\x02\x86ub"

@@ -62,9 +62,15 @@ def test_a_chart_in_another_unit_is_refused_with_the_scale_that_mends_it():
     ("spoil", "message"),
     [
         (lambda uv: None, "has no UV"),
-        (lambda uv: np.where(np.arange(len(uv))[:, None, None] == 7, np.nan, uv), "triangle 7 has a corner"),
+        (
+            lambda uv: np.where(np.arange(len(uv))[:, None, None] == 7, np.nan, uv),
+            "triangle 7 has a corner",
+        ),
         (lambda uv: np.where(np.arange(len(uv))[:, None, None] == 4, 0.0, uv), "triangle 4 has no area"),
-        (lambda uv: uv * [4.0, 0.25], "that is a texture and no pattern"),  # each triangle along its own axes
+        (
+            lambda uv: uv * [4.0, 0.25],
+            "that is a texture and no pattern",
+        ),  # each triangle along its own axes
     ],
 )
 def test_a_chart_that_is_no_pattern_is_refused(spoil, message):

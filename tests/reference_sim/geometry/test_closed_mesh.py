@@ -35,7 +35,11 @@ CUBES = np.concatenate([CUBE, CUBE[2:] + np.array([1, 1, 0])])[None]
         (BALL[None], FACES[1:], r"not closed: edge \(\d+, \d+\) of face \d+ has one face only: fill"),
         (BALL[None], TURNED, r"edge \(\d+, \d+\) of face \d+ .*wind all faces outwards"),
         (BALL[None], FACES[:, ::-1], "inside out .*reverse its faces"),
-        (CUBES, np.concatenate([CUBE_FACES, NUMBER[CUBE_FACES]]), r"edge \((6, 7|7, 6)\) .* more than two"),
+        (
+            CUBES,
+            np.concatenate([CUBE_FACES, NUMBER[CUBE_FACES]]),
+            r"edge \((6, 7|7, 6)\) .* more than two",
+        ),
     ],
 )
 def test_what_is_no_closed_surface(positions, faces, message):

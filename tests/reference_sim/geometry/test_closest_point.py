@@ -61,7 +61,9 @@ def test_distances_are_those_of_libigl(name, kind):
     positions, faces = MESHES[name]
     positions, points = positions.astype(kind), samples(positions, faces).astype(kind)
     closest = tree_of(positions, faces).nearest(points)
-    squared = igl.point_mesh_squared_distance(*(x.astype(np.float64) for x in (points, positions)), faces)[0]
+    squared = igl.point_mesh_squared_distance(
+        *(x.astype(np.float64) for x in (points, positions)), faces
+    )[0]
     distance = np.linalg.norm(points - closest.points, axis=1)
     # Far points lose digits by their own size; feet on slivers are known by fewer, theirs and ours.
     assert distance == pytest.approx(np.sqrt(squared), rel=1e-14, abs=1e-12)

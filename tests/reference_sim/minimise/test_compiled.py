@@ -22,7 +22,12 @@ def pressed(seed: int, *, pins: tuple[int, ...] = (0, 6)) -> tuple[Potential, np
     positions[:, 1] += 0.098
     cloth = Cloth(positions, faces, Material(), pins=pins)
     angles = np.random.default_rng(seed).uniform(-1, 1, len(cloth.hinges))
-    terms = [StretchStVK(cloth), BendHinge(cloth, rest_angles=angles), Gravity(cloth), ContactPenalty(cloth)]
+    terms = [
+        StretchStVK(cloth),
+        BendHinge(cloth, rest_angles=angles),
+        Gravity(cloth),
+        ContactPenalty(cloth),
+    ]
     potential = Potential([*terms, Inertia(cloth, DT)])
     velocity = np.random.default_rng(seed + 1).normal(0, 0.2, positions.shape)
     velocity[cloth.pins] = 0.0
@@ -57,7 +62,9 @@ def test_iterations_are_those_of_the_exact_solver(iterations):
     assert descent.iterations == iterations == exact.iterations and descent.status == "max_iterations"
     start = potential.value(guess)
     assert start - potential.value(descent.positions) == pytest.approx(start - exact.energy, rel=2e-3)
-    assert np.abs(descent.positions - exact.positions).max() < 0.02 * np.abs(exact.positions - guess).max()
+    assert (
+        np.abs(descent.positions - exact.positions).max() < 0.02 * np.abs(exact.positions - guess).max()
+    )
     assert np.array_equal(descent.positions[potential.cloth.pins], guess[potential.cloth.pins])
     assert descent.terms == pytest.approx(potential.terms(descent.positions), rel=1e-4, abs=1e-8)
 

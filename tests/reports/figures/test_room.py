@@ -33,7 +33,9 @@ def test_panels_of_many_methods_are_at_least_four_centimetres_wide_and_high(draw
         scale = 2.54 * min(PRINTED, 17.0 / 2.54 / drawing.canvas.get_figwidth()) / drawing.canvas.dpi
         for axes in drawing.canvas.axes:
             width, height = (scale * length for length in axes.get_window_extent().bounds[2:])
-            assert min(width, height) >= LEAST, f"{drawing.name}: a panel of {width:.1f} x {height:.1f} cm"
+            assert min(width, height) >= LEAST, (
+                f"{drawing.name}: a panel of {width:.1f} x {height:.1f} cm"
+            )
 
 
 def test_no_text_covers_another_or_a_panel_and_all_are_inside_the_figure(drawings):
@@ -69,4 +71,6 @@ def texts(canvas) -> tuple[list[Text], list[Text]]:
             ticks = [tick for tick in axis.get_major_ticks() if low <= tick.get_loc() <= high]
             around += [axis.label, *(tick.label1 for tick in ticks)]
     written = [text for axes in canvas.axes for text in axes.texts]
-    return tuple([t for t in some if t.get_visible() and t.get_text().strip()] for some in (around, written))
+    return tuple(
+        [t for t in some if t.get_visible() and t.get_text().strip()] for some in (around, written)
+    )

@@ -33,7 +33,9 @@ def rows_of_page():
                 rows.append(row(scene, method, "curvature/error", 9.0 / number, unit="1/m", **part))
     failed = {"value": None, "status": "failed", "reason": f"diverged {NASTY}"}
     rows.append(row(WHOLE, NASTY, "energy/total", **failed))
-    rows.append(row(WHOLE, "supervised", "energy/total", value=None, status="timeout", reason="over 30 s"))
+    rows.append(
+        row(WHOLE, "supervised", "energy/total", value=None, status="timeout", reason="over 30 s")
+    )
     return [*rows, skipped(scene="hanging_sheet", suite="speed")]
 
 
@@ -102,7 +104,9 @@ def unpacked(entries: dict, text: str) -> dict[str, np.ndarray]:
         shape = tuple(entry["shape"])
         size = int(np.prod(shape))
         if entry["kind"] == "positions":
-            low, high = np.frombuffer(data, np.uint8, 2 * size, entry["at"]).reshape(2, *shape).astype(int)
+            low, high = (
+                np.frombuffer(data, np.uint8, 2 * size, entry["at"]).reshape(2, *shape).astype(int)
+            )
             left = low + 256 * high
             left = np.where(left % 2, -(left + 1) // 2, left // 2)
             steps = np.zeros((shape[0] + 2, *shape[1:]), dtype=int)

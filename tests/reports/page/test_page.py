@@ -98,7 +98,9 @@ def test_the_page_is_well_formed_and_asks_for_nothing(folder):
     linked = [value for _, name, value in markup.attributes if name in ("src", "href", "action", "data")]
     assert linked == ["data:,"]
     assert not re.search(r"\b(fetch|XMLHttpRequest|WebSocket|importScripts|import)\b\s*\(", page)
-    addresses = set(re.findall(r"(?:https?:)?//[\w.]+\.\w+[^'\" ]*", re.sub(r">[\w+/=]{99,}<", "><", page)))
+    addresses = set(
+        re.findall(r"(?:https?:)?//[\w.]+\.\w+[^'\" ]*", re.sub(r">[\w+/=]{99,}<", "><", page))
+    )
     assert addresses == {"http://www.w3.org/2000/svg"}
 
 

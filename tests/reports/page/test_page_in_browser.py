@@ -39,7 +39,8 @@ def in_browser(path: Path, script: str, folder: Path, address: str = "") -> dict
 
 @pytest.mark.slow
 @pytest.mark.skipif(
-    not (shutil.which("chromium") or shutil.which("chromium-browser")), reason="no chromium on this machine"
+    not (shutil.which("chromium") or shutil.which("chromium-browser")),
+    reason="no chromium on this machine",
 )
 def test_a_person_can_use_it(folder, tmp_path):
     state = in_browser(folder.page_path, ACTIONS.read_text(encoding="utf-8"), tmp_path)
@@ -51,7 +52,9 @@ def test_a_person_can_use_it(folder, tmp_path):
     assert (state["playing"], state["paused"]) == ("Pause", "Play") and state["played"]
     assert state["clock"] == "0.07 s · 3 of 5"
     assert state["added"] == "newton-4" and state["withAdded"][-1] == "Newton, 4 iterations"
-    assert state["pointed"] == "pbns" and "pbns" in state["withPointed"] and len(state["withPointed"]) == 4
+    assert (
+        state["pointed"] == "pbns" and "pbns" in state["withPointed"] and len(state["withPointed"]) == 4
+    )
     assert state["focused"] == "pbns"
     assert state["turned"] and state["scale"] == "Mean curvature [1/m]"
     assert state["colours"] == ["plain", "curvature", "step", "distance", "depth"]

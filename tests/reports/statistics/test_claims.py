@@ -182,12 +182,15 @@ def test_what_diverged_is_the_worse_one_and_not_a_dash():
         (4, NOTHING, ("timeout", "timeout"), ": no roll-out of the second finished"),
     ],
 )
-def test_one_seed_few_motions_or_another_failure_do_not_make_a_method_worse(motions, of_seeds, ends, remark):
+def test_one_seed_few_motions_or_another_failure_do_not_make_a_method_worse(
+    motions, of_seeds, ends, remark
+):
     gone = [replace(r, status=ends[r.seed]) for r in seeds("pbns", of_seeds, **GONE)]
     rows = [r for r in [*seeds("snug", (1.0, 1.1)), *gone] if r.scene in MOTIONS[:motions]]
     line = told(rows)[STRAIN]
     assert (line.verdict, line.remark) == ("inconclusive", remark)
-    # One that was left out has not failed, and a roll-out that came to its end shows that not every one does.
+    # One that was left out has not failed, and a roll-out that came to its end shows that not every one
+    # does.
     skipped = seeds("pbns", NOTHING, status="skipped", reason="not asked for")
     assert told([*seeds("snug", (1.0, 1.1)), *skipped]) == {}
     ended = row(MOTIONS[0], "pbns", "cost/frame", 1.0)
@@ -222,7 +225,11 @@ def test_the_share_of_frames_with_more_energy_is_counted_scene_by_scene_and_seed
 
 @pytest.mark.parametrize(
     ("snug", "motions", "verdict"),
-    [(1.0, 6, "holds"), (3.0, 6, "does not hold"), (1.0, 4, "inconclusive")],  # a sign test of 4: p of 0.125
+    [
+        (1.0, 6, "holds"),
+        (3.0, 6, "does not hold"),
+        (1.0, 4, "inconclusive"),
+    ],  # a sign test of 4: p of 0.125
 )
 def test_a_claim_of_frames_is_judged_by_the_share_of_them(monkeypatch, snug, motions, verdict):
     monkeypatch.setitem(globals(), "MOTIONS", (*MOTIONS, "tshirt/spin", "tshirt/run")[:motions])

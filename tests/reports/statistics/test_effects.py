@@ -62,7 +62,8 @@ TALL, APART = np.array([[0.1], [5.0], [-3.0], [9.0]]), np.array([[0.1], [0.2], [
     [
         (BELOW, "pbns", FOUR, "seeds", *welch(BELOW, FOUR)),
         (TALL, "pbns", TALL - APART, "motions", APART.std(ddof=1) / 2.0, 3.0),
-        # A method without seeds has no scatter; one run of a seeded method is one more draw of the scatter.
+        # A method without seeds has no scatter; one run of a seeded method is one more draw of the
+        # scatter.
         (BELOW, "simulation", [[-0.4]], "seeds", BELOW.std(ddof=1) * math.sqrt(1 / 3), 2.0),
         (BELOW, "pbns", [[-0.4]], "seeds", BELOW.std(ddof=1) * math.sqrt(4 / 3), 2.0),
     ],
@@ -85,7 +86,9 @@ def test_seeds_of_a_pairing_group_are_drawn_at_once_and_others_by_themselves():
     later = [row(method="snug-no-inertia", value=v, seed=k) for k, v in enumerate(LESS, 1)]
     later = mean_of(run_of(later).frame, "snug-no-inertia", "energy/strain")
     for other in (mean_over(LESS, "pbns"), mean_over([*LESS, 1.1], "snug-no-inertia"), later):
-        assert effect(other, mean_over(ONE)).p_value() > 0.5  # other networks and seeds draw other numbers
+        assert (
+            effect(other, mean_over(ONE)).p_value() > 0.5
+        )  # other networks and seeds draw other numbers
     rows = [row(method="snug-no-inertia", value=LESS[k], seed=k) for k in (2, 0, 1)]
     turned = mean_of(run_of(rows).frame, "snug-no-inertia", "energy/strain")
     assert effect(turned, mean_over(ONE)) == alike  # by their number, not their order
@@ -154,7 +157,9 @@ def test_segments_of_a_recording_are_no_independent_motions(alike, monkeypatch):
     assert 0.93 <= held() <= 0.98
     same = {(scene, 0): 99.7 for scene in MOTIONS}
     constant = Mean(99.7, None, 1, 20, seeded=False, cells=same)
-    assert effect(constant, replace(constant, cells=dict.fromkeys(same, 0.1)), DIFFERENCE).interval is None
+    assert (
+        effect(constant, replace(constant, cells=dict.fromkeys(same, 0.1)), DIFFERENCE).interval is None
+    )
     if alike:
         monkeypatch.setattr(effects, "recording_of", lambda scene: scene)
         assert held() < 0.85

@@ -131,7 +131,9 @@ def test_the_uncertainty_of_an_error_is_of_two_members_of_the_ensemble_that_conv
     # The second scene has no spread then: a member that stalled takes no part.
     assert band(status="stalled", reason="a frame") == [pytest.approx(12.5**0.5), 0.0]
     rows = [row(SCENES[0], "simulation-perturbed-1e-4", "distance/rms", 3.0, "mm")]
-    rows.append(row(SCENES[0], "simulation-1e-8", "distance/rms", 90.0, "mm", status="stalled", reason="?"))
+    rows.append(
+        row(SCENES[0], "simulation-1e-8", "distance/rms", 90.0, "mm", status="stalled", reason="?")
+    )
     assert indistinct(run_of(rows), run_of(rows).frame, "distance/rms") == 0.0
 
 

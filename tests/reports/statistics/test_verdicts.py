@@ -32,7 +32,9 @@ def test_a_tie_is_an_interval_within_the_margin_and_not_a_point_estimate(value, 
 
 def test_the_spread_of_the_ensemble_widens_the_margin_and_the_least_difference():
     far = Effect(0.2, error=0.01, **FOUR)
-    stands = {moved: standing(replace(far, uncertainty=moved), far.p_value()) for moved in (0.1, 0.21, 0.3)}
+    stands = {
+        moved: standing(replace(far, uncertainty=moved), far.p_value()) for moved in (0.1, 0.21, 0.3)
+    }
     assert stands == {0.1: MORE, 0.21: OPEN, 0.3: TIED}
 
 

@@ -12,7 +12,9 @@ from tests.reports.report_folder import SCENES, row, run_of
 
 
 def seeds_of(method, metric, values, **more):
-    return [row(method=method, metric=metric, value=value, seed=k, **more) for k, value in enumerate(values)]
+    return [
+        row(method=method, metric=metric, value=value, seed=k, **more) for k, value in enumerate(values)
+    ]
 
 
 def column(table, name):
@@ -48,7 +50,9 @@ def test_a_failed_cell_enters_no_mean_and_the_table_says_so():
     table = make_tables(run)["energies"]
     lines = {line[1]: line[2] for line in table.rows}
     assert lines["snug"].value == 1.0 and not lines["snug"].complete
-    assert lines["simulation"].value == 5.0 and lines["simulation"].complete and lines["simulation"].stalled
+    assert (
+        lines["simulation"].value == 5.0 and lines["simulation"].complete and lines["simulation"].stalled
+    )
     block = lay_out_table(run, table)
     assert [line[1]["mark"] for line in block["groups"][0]["rows"]] == ["†", "*"]
     assert "fewer scenes" in block["note"] and "unconverged" in block["note"]

@@ -14,13 +14,17 @@ SMPL_FACES = 13776  # 6890 vertices
 def child(body: Body) -> Body:
     """The body shrunk to 70 % of its size, a little shorter still."""
     size = np.array([0.7, 0.63, 0.7])
-    return dataclasses.replace(body, template=body.template * size, joint_template=body.joint_template * size)
+    return dataclasses.replace(
+        body, template=body.template * size, joint_template=body.joint_template * size
+    )
 
 
 def other_mesh(body: Body, faces: int = SMPL_FACES) -> Body:
     """Edges collapsed to so many faces; weights and shapes from the closest points of the body."""
     points, triangles, *_ = igl.decimate(body.template, body.faces.astype(np.int64), faces)
-    _, nearest, closest = igl.point_mesh_squared_distance(points, body.template, body.faces.astype(np.int64))
+    _, nearest, closest = igl.point_mesh_squared_distance(
+        points, body.template, body.faces.astype(np.int64)
+    )
     corners = body.faces[nearest]
     shares = igl.barycentric_coordinates(closest, *(body.template[corners[:, k]] for k in range(3)))
     shares = np.clip(shares, 0.0, None)
@@ -78,7 +82,12 @@ def with_hands(arrays: dict[str, np.ndarray], face: bool) -> dict[str, np.ndarra
             joints += [regressor[hand] + (finger - 2 + k) * bone for k in range(3)]
             shares += [weights[:, hand] / 15] * 3
     table = np.stack([np.array(parents), np.arange(len(parents))]).astype(np.uint32)
-    return {**arrays, "J_regressor": np.stack(joints), "weights": np.stack(shares, 1), "kintree_table": table}
+    return {
+        **arrays,
+        "J_regressor": np.stack(joints),
+        "weights": np.stack(shares, 1),
+        "kintree_table": table,
+    }
 
 
 def plain_arrays(body: Body) -> dict[str, np.ndarray]:

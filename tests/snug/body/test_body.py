@@ -59,7 +59,9 @@ def test_vertices_agree_with_the_skinning_used_in_training(body):
     )
     some = slice(0, None, 97)
     expected = skin(
-        torch.from_numpy(body.shaped(betas)[some]), torch.from_numpy(body.skinning_weights[some]), transforms
+        torch.from_numpy(body.shaped(betas)[some]),
+        torch.from_numpy(body.skinning_weights[some]),
+        transforms,
     )
     np.testing.assert_allclose(body.vertices(poses, shifts, betas)[:, some], expected.numpy(), atol=1e-12)
 

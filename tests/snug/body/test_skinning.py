@@ -29,7 +29,9 @@ def test_chain_against_homogeneous_matrices():
     for joint, parent in enumerate(PARENTS):
         local = np.eye(4)
         local[:3, :3] = rotations[joint].numpy()
-        local[:3, 3] = (joints[joint] + translation if parent < 0 else joints[joint] - joints[parent]).numpy()
+        local[:3, 3] = (
+            joints[joint] + translation if parent < 0 else joints[joint] - joints[parent]
+        ).numpy()
         world.append(local if parent < 0 else world[parent] @ local)
     transforms = joint_transforms(rotations, joints, PARENTS, translation)
     for joint, matrix in enumerate(world):
@@ -40,7 +42,9 @@ def test_chain_against_homogeneous_matrices():
 
 @pytest.mark.parametrize("windows", [2, 16])
 def test_closed_form_is_skinning_and_its_derivative(windows):
-    points, transforms, above = (random_tensor(windows, 3, *s).float() for s in ((50, 3), (4, 3, 4), (50, 3)))
+    points, transforms, above = (
+        random_tensor(windows, 3, *s).float() for s in ((50, 3), (4, 3, 4), (50, 3))
+    )
     weights = torch.softmax(random_tensor(50, 4), -1).float()
     weights[::2, 1:3] = 0.0  # most joints do not move a vertex
     fast, slow = points.clone().requires_grad_(), points.double().requires_grad_()

@@ -98,11 +98,15 @@ def test_correctives_of_fingers_are_left_out(layouts, small, tmp_path):
 
 
 def test_the_eyes_of_a_head_are_closed(small, layouts, tmp_path):
-    sides = np.linalg.norm(np.diff(small.template[small.faces[:, [0, 1, 2, 0]]], axis=1), axis=2).sum(axis=1)
+    sides = np.linalg.norm(np.diff(small.template[small.faces[:, [0, 1, 2, 0]]], axis=1), axis=2).sum(
+        axis=1
+    )
     reach = np.bincount(small.faces.ravel(), np.repeat(sides, 3))
     around = (small.faces == np.argmin(reach)).any(axis=1)
     user = read_body(saved(tmp_path / "a.npz", layouts["SMPL"] | {"f": small.faces[~around]}))
-    assert volume(user.template, user.faces) == pytest.approx(volume(small.template, small.faces), rel=0.01)
+    assert volume(user.template, user.faces) == pytest.approx(
+        volume(small.template, small.faces), rel=0.01
+    )
     edges = np.sort(user.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
     assert np.all(np.unique(edges, axis=0, return_counts=True)[1] == 2)
 

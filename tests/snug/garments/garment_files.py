@@ -39,7 +39,9 @@ def own_chart(positions, faces, gap: float = 1.0):
     random = np.random.default_rng(0)
     chart[::2, :, 1] *= -1  # mirrored, as half of a pattern often is
     angle = random.uniform(0, 2 * np.pi, len(corners))
-    turn = np.stack([np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle)], axis=1).reshape(-1, 2, 2)
+    turn = np.stack([np.cos(angle), -np.sin(angle), np.sin(angle), np.cos(angle)], axis=1).reshape(
+        -1, 2, 2
+    )
     return chart @ turn.transpose(0, 2, 1) + gap * random.uniform(0, 1, (len(corners), 1, 2))
 
 

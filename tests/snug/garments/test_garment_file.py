@@ -128,7 +128,10 @@ def moved(garment, change):
     [
         (lambda s: moved(s, lambda x: 100 * x), "not lie on the body .*: give 'mine.obj,units=cm,up=y'$"),
         (lambda s: moved(s, lambda x: z_up(x) / 0.0254), ",units=in,up=z'$"),
-        (lambda s: moved(s, lambda x: np.add(x, (0.03, -0.1, 0.02))), "mm deep in the body.*: move it onto"),
+        (
+            lambda s: moved(s, lambda x: np.add(x, (0.03, -0.1, 0.02))),
+            "mm deep in the body.*: move it onto",
+        ),
         (lambda s: moved(s, lambda x: np.add(x, (0, 0, 0.5))), "mm from the body.*: move it onto"),
         (lambda s: {"faces": np.concatenate([s.faces, s.faces[5:6]])}, "a cloth is manifold"),
     ],
@@ -152,7 +155,9 @@ def test_a_seam_that_a_program_left_open_is_refused(tmp_path, body, tube, gap=1e
     positions, faces = doubled_along(tube.rest_positions, tube.faces, front)
     positions[len(tube.rest_positions) :, 0] -= gap
     path = saved(tmp_path, tube, positions=positions, faces=faces)
-    says = rf"{2 * len(front)} vertices of a seam lie up to {1e3 * gap:.2g} mm apart, one at \(.*\) m: merge"
+    says = (
+        rf"{2 * len(front)} vertices of a seam lie up to {1e3 * gap:.2g} mm apart, one at \(.*\) m: merge"
+    )
     with pytest.raises(GarmentError, match=says):
         read_garment(GarmentFile(path=path), body)
     positions[len(tube.rest_positions) :, 0] -= 0.02  # a slit
@@ -160,7 +165,10 @@ def test_a_seam_that_a_program_left_open_is_refused(tmp_path, body, tube, gap=1e
 
 
 def test_a_word_that_means_nothing_is_refused():
-    for words, expected in (("uv_scale=2", "add rest=uv"), ("units=km", "units=km: choose from m, cm, mm")):
+    for words, expected in (
+        ("uv_scale=2", "add rest=uv"),
+        ("units=km", "units=km: choose from m, cm, mm"),
+    ):
         with pytest.raises(ValueError, match=expected):
             parse_garment_file(f"a.obj,{words}")
 

@@ -108,7 +108,9 @@ def test_the_tunic_is_longer_and_flares_by_what_is_asked(body):
     low = [girth(g.rest_positions, g.faces, 1, hem + 0.004) for g in (flared, straight)]
     # A little above the hem, where the cone is 4 mm of its height narrower; chords lose the rest.
     assert (low[0] - low[1]) / (2 * np.pi) == pytest.approx(0.045, abs=0.002)
-    above = [girth(g.rest_positions, g.faces, 1, at(body, "spine1")[1] + 0.05) for g in (flared, straight)]
+    above = [
+        girth(g.rest_positions, g.faces, 1, at(body, "spine1")[1] + 0.05) for g in (flared, straight)
+    ]
     assert above[0] == pytest.approx(above[1], abs=0.01)
 
 
@@ -126,7 +128,10 @@ def test_ease_is_girth_at_waist_and_cuff(body):
     assert girth(loose.rest_positions, loose.faces, 0, cuff) == pytest.approx(
         arm + 2 * np.pi * 0.015 + 0.06, abs=0.005
     )
-    assert at_waist[0] > girth(body.template, body.faces, 1, at(body, "spine1")[1]) + 2 * np.pi * 0.015 + 0.06
+    assert (
+        at_waist[0]
+        > girth(body.template, body.faces, 1, at(body, "spine1")[1]) + 2 * np.pi * 0.015 + 0.06
+    )
 
 
 def test_another_shape_carries_the_shirt_along(body, shirt):
@@ -209,7 +214,9 @@ ON_OTHERS = [
 @pytest.mark.parametrize(("kind", "other"), ON_OTHERS)
 def test_every_kind_fits_another_body_and_can_be_simulated(body, kind, other):
     garment = find_template(kind).tailor(other(body), vertices=500)
-    assert set(garment.loops) == OPENINGS[kind] and len(garment.cloth().masses) == len(garment.rest_positions)
+    assert set(garment.loops) == OPENINGS[kind] and len(garment.cloth().masses) == len(
+        garment.rest_positions
+    )
 
 
 def test_a_neck_is_cut_above_high_shoulders(body):

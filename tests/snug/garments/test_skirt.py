@@ -46,7 +46,9 @@ def test_a_skirt_fits_waist_and_hips_and_has_two_even_rims(body, skirt):
     distance = igl.signed_distance(points, body.template, body.faces)[0]
     waist, hem = (points[skirt.loops[name]] for name in ("waist", "hem"))
     hip, knee = (body.joint_template[JOINT[n], 1] for n in ("left_hip", "left_knee"))
-    assert np.ptp(waist[:, 1]) < 1e-4 and np.ptp(hem[:, 1]) < 1e-4 and knee < hem[0, 1] < hip < waist[0, 1]
+    assert (
+        np.ptp(waist[:, 1]) < 1e-4 and np.ptp(hem[:, 1]) < 1e-4 and knee < hem[0, 1] < hip < waist[0, 1]
+    )
     assert distance[skirt.pins].max() < 0.012  # the band lies close
     levels = np.linspace(hem[0, 1], waist[0, 1], 10)[1:-1]
     girths = [girth(points, skirt.faces, 1, level) for level in levels]
@@ -67,7 +69,10 @@ def test_the_body_carries_the_waistband_close(body, skirt):
     motion = make_motion("turning_stop")
     frames = slice(20, 60, 10)
     poses, translations = motion.poses[frames], motion.translations[frames]
-    transported, skins = skirt.pin_positions(body, poses, translations), body.vertices(poses, translations)
+    transported, skins = (
+        skirt.pin_positions(body, poses, translations),
+        body.vertices(poses, translations),
+    )
     assert transported.shape == (4, len(skirt.pins), 3)
     for band, skin in zip(transported, skins, strict=True):
         assert np.abs(igl.signed_distance(band, skin, body.faces)[0]).max() < 0.02
@@ -104,7 +109,9 @@ def test_no_network_moves_the_waistband(scene, kind, tmp_path):
     assert dressed.skinned(motion, smoothing=20)[:, pins] == pytest.approx(handles(scene), abs=1e-5)
     trained = short(kind, dressed=dressed, motions=[motion], steps=5)
     untrained = untrained_model(kind, dressed, [motion], seed=0)
-    read = TrainedModel.load(untrained.save(tmp_path / "m.safetensors"))  # weights at the waistband: not zero
+    read = TrainedModel.load(
+        untrained.save(tmp_path / "m.safetensors")
+    )  # weights at the waistband: not zero
     free = np.setdiff1d(np.arange(dressed.vertices), pins)
     for model in (untrained, trained, read):
         positions = roll_out(model, dressed, motion).positions

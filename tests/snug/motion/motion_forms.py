@@ -102,7 +102,9 @@ def bvh(poses, trans, fps, *, names=None, order="ZXY", unit=1.0, rest=REST_JOINT
         for child in children:
             write(child, depth + 1)
         if not children:
-            lines.extend([f"{space}\tEnd Site", f"{space}\t{{", f"{space}\t\tOFFSET 0 0.1 0", f"{space}\t}}"])
+            lines.extend(
+                [f"{space}\tEnd Site", f"{space}\t{{", f"{space}\t\tOFFSET 0 0.1 0", f"{space}\t}}"]
+            )
         lines.append(f"{space}}}")
 
     write(0, 0)

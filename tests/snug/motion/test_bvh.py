@@ -63,7 +63,9 @@ def test_skeletons_of_other_programs_are_known(names, sides):
     left, right = ([limb.format(side) for limb in limbs] for side in sides)
     parents = [0, 1, 2, 0, 4, 5, 0, 7, 8, 0, 10, 11]
     joints = [*left, *right]
-    mapping = known(", ".join([f"{root} -1", *(f"{j} {p}" for j, p in zip(joints, parents)), f"{head} 0"]))
+    mapping = known(
+        ", ".join([f"{root} -1", *(f"{j} {p}" for j, p in zip(joints, parents)), f"{head} 0"])
+    )
     for side, theirs in (("left", left), ("right", right)):
         assert [mapping[f"{side}_{joint}"] for joint in NEEDED] == theirs
     assert (mapping["pelvis"], mapping["head"]) == (root, head)
@@ -89,7 +91,9 @@ def test_limbs_of_another_skeleton_point_where_its_own_do(tmp_path):
     limbs = ("left_shoulder left_elbow", "right_elbow right_wrist", "left_hip left_knee")
     for near, far in map(str.split, limbs):
         ours, theirs = (x[JOINT[far]] - x[JOINT[near]] for x in (joints, back.apply(rest)))
-        np.testing.assert_allclose(ours / np.linalg.norm(ours), theirs / np.linalg.norm(theirs), atol=1e-6)
+        np.testing.assert_allclose(
+            ours / np.linalg.norm(ours), theirs / np.linalg.norm(theirs), atol=1e-6
+        )
     for name in ("spine1", "spine3", "neck", "left_collar"):
         np.testing.assert_allclose(motion.poses[:, JOINT[name]], 0.0, atol=1e-9)
 
@@ -110,7 +114,10 @@ def test_the_path_is_scaled_by_the_length_of_the_legs(tmp_path):
         (lambda text: text.replace("left_knee", "left_thing"), "no joint is known as 'left_knee'"),
         (lambda text: text.replace("head", "hat"), "no joint is known as 'head'"),
         (lambda text: text.rsplit(" ", 1)[0] + " nan\n", "should be 75 finite numbers"),
-        (lambda text: text.replace("left", "?").replace("right", "left").replace("?", "right"), "backwards"),
+        (
+            lambda text: text.replace("left", "?").replace("right", "left").replace("?", "right"),
+            "backwards",
+        ),
     ],
 )
 def test_a_broken_file_is_refused(tmp_path, change, words):

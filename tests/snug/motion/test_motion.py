@@ -32,7 +32,9 @@ from snug.motion.posture import poses_from_angles
 from tests.snug.motion.motion_forms import joint_speeds
 
 # Those made by code; tests of recorded clips are in test_recorded.
-MADE = [name for name in (*CONTROL, *VALIDATION, *TEST, *DYNAMIC_VALIDATION) if clip_of(name) not in CLIPS]
+MADE = [
+    name for name in (*CONTROL, *VALIDATION, *TEST, *DYNAMIC_VALIDATION) if clip_of(name) not in CLIPS
+]
 STOPPING = [name for name in MADE if name in STOPS]
 ACTING = [name for name in MADE if name not in STOPS]
 RISING = "climbing_steps"  # its floor is steps
@@ -77,7 +79,9 @@ def test_a_motion_is_a_moving_person(library, name):
     assert -0.035 < lowest.min() <= lowest.max() < highest
     velocity = np.diff(motion.translations, axis=0) * 30.0
     assert np.linalg.norm(velocity, axis=1).max() < 4.0
-    assert np.linalg.norm(np.diff(velocity, axis=0) * 30.0, axis=1).max() < 45.0  # a push-off is about 3.5 g
+    assert (
+        np.linalg.norm(np.diff(velocity, axis=0) * 30.0, axis=1).max() < 45.0
+    )  # a push-off is about 3.5 g
     np.testing.assert_allclose(motion.translations[0, [0, 2]], 0.0, atol=1e-12)
     assert abs(motion.translations[0, 1]) < 0.1 and rotation_matrices(motion.poses[0, 0])[2, 2] > 0.95
     assert arm_clearance(motion).min() > ARMS_CLEAR

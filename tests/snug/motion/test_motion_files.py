@@ -72,7 +72,10 @@ FAR = KICK.translations + np.where(FROM_5, [0.5, 0.0, 0.0], 0.0)
         ({"poses": np.degrees(KICK.poses)}, "radians, not degrees"),
         ({"trans": KICK.translations + 1e5}, "metres"),
         ({"trans": KICK.translations[1:]}, r"'trans' has shape \(39, 3\); give \(40, 3\)"),
-        ({"trans": np.where(FROM_5, np.nan, KICK.translations)}, "not finite in 35 frames, from frame 5 on"),
+        (
+            {"trans": np.where(FROM_5, np.nan, KICK.translations)},
+            "not finite in 35 frames, from frame 5 on",
+        ),
         ({"poses": spike(20)}, "first of right_elbow before frame 20; cut"),
         ({"trans": FAR}, "first of the root before frame 5; cut"),
         ({"fps": 0}, "rates are 5 to 1000"),

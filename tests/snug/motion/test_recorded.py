@@ -76,5 +76,7 @@ def test_a_segment_starts_at_the_origin_facing_forward_on_the_clips_floor(name, 
     np.testing.assert_allclose(motion.translations[:, 1], clip.translations[start:stop, 1], atol=1e-12)
     assert rotation_matrices(motion.poses[0, 0])[0, 2] == pytest.approx(0.0, abs=1e-6)
     np.testing.assert_array_equal(motion.poses[:, 1:], clip.poses[start:stop, 1:])
-    steps = [np.linalg.norm(np.diff(m.translations, axis=0), axis=1) for m in (motion, clip.cut(start, stop))]
+    steps = [
+        np.linalg.norm(np.diff(m.translations, axis=0), axis=1) for m in (motion, clip.cut(start, stop))
+    ]
     np.testing.assert_allclose(*steps, atol=1e-12)

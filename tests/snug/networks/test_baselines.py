@@ -37,7 +37,9 @@ def test_sizes_are_those_of_the_papers():
     assert sum(p.numel() for p in santesteban.parameters()) == fit + gru + 1500 * 12 + 12
     tailornet = make_network("tailornet", 151, 4, KINDS["tailornet"].recipe, seed=0)
     inner = 1024 * 1024 + 1024 + 1024 * 12 + 12
-    assert sum(p.numel() for p in tailornet.parameters()) == (151 + 1) * 1024 + (141 + 1) * 1024 + 2 * inner
+    assert (
+        sum(p.numel() for p in tailornet.parameters()) == (151 + 1) * 1024 + (141 + 1) * 1024 + 2 * inner
+    )
 
 
 @pytest.mark.parametrize("shapes", [0, 3])
@@ -47,7 +49,9 @@ def test_a_body_of_fewer_shapes_has_zeros_for_the_rest(shapes):
     few = replace(dressed.body, shape_directions=dressed.body.shape_directions[..., :shapes],
                   joint_directions=dressed.body.joint_directions[..., :shapes])  # fmt: skip
     betas = np.arange(1.0, 1 + shapes)
-    features = DressedBody(few, dressed.garment).features(motion, DEFAULT, betas, feature_set="pose_shape")
+    features = DressedBody(few, dressed.garment).features(
+        motion, DEFAULT, betas, feature_set="pose_shape"
+    )
     whole = dressed.features(
         motion, DEFAULT, np.append(betas, np.zeros(10 - shapes)), feature_set="pose_shape"
     )

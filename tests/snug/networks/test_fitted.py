@@ -29,7 +29,9 @@ def test_a_training_pose_has_its_own_offsets_and_a_pose_between_two_is_shared():
     assert torch.allclose(network(poses[:, None])[0][:, 0], offsets, atol=1e-6)
     far = poses + 100.0 * torch.arange(50.0)[:, None]
     network.learn(far, offsets)
-    between = 0.75 * far[7] + 0.25 * far[8]  # nine times as much of 7 as of 8; the next are further by far
+    between = (
+        0.75 * far[7] + 0.25 * far[8]
+    )  # nine times as much of 7 as of 8; the next are further by far
     others = [1 / float((between - far[i]).square().sum()) for i in (7, 8, 6, 9)]
     expected = sum(w * offsets[i] for w, i in zip(others, (7, 8, 6, 9))) / sum(others)
     assert NEIGHBOURS == 4 and torch.allclose(network(between[None, None])[0][0, 0], expected, atol=1e-6)

@@ -28,7 +28,11 @@ def test_the_file_of_a_network_is_whole_and_names_its_training(name):
     origin = model.origin
     assert trained.network_name(origin["network"], origin["garment"], model.seed) == name
     assert model.vertices == 1002 and len(origin["motions"]) == 34 and origin["left_out"] == []
-    assert bool(origin["simulated_by"]) == (origin["network"] == "supervised") == bool(origin["data_seconds"])
+    assert (
+        bool(origin["simulated_by"])
+        == (origin["network"] == "supervised")
+        == bool(origin["data_seconds"])
+    )
     assert "+changes" not in origin["commit"] and origin["hardware"]["processor"]
     assert {"machine", "training", "seed", "steps", "motions"} <= set(origin["inputs"])
     assert origin["versions"]["torch"]

@@ -72,7 +72,9 @@ def test_its_gradient_is_that_of_finite_differences(tethered, kernels):
         shift = torch.zeros_like(x)
         shift[n, t, v, axis] = step
         above, below = ((value(x.detach() + sign * shift) * factors).sum() for sign in (1, -1))
-        assert float(gradient[n, t, v, axis]) == pytest.approx(float(above - below) / (2 * step), rel=1e-5)
+        assert float(gradient[n, t, v, axis]) == pytest.approx(
+            float(above - below) / (2 * step), rel=1e-5
+        )
 
 
 @pytest.mark.parametrize("kernels", [True, False])

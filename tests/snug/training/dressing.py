@@ -46,7 +46,9 @@ def tube_dress() -> DressedBody:
     index = np.arange(AROUND * RINGS).reshape(RINGS, AROUND)
     a, b = index[:-1], np.roll(index[:-1], -1, axis=1)
     c, d = index[1:], np.roll(index[1:], -1, axis=1)
-    faces = np.concatenate([np.stack([a, b, d], -1).reshape(-1, 3), np.stack([a, d, c], -1).reshape(-1, 3)])
+    faces = np.concatenate(
+        [np.stack([a, b, d], -1).reshape(-1, 3), np.stack([a, d, c], -1).reshape(-1, 3)]
+    )
     nearest = nearest_body_vertices(body, positions)
     weights = np.asarray(body.skinning_weights)[nearest]
     return DressedBody(body, Garment("tube", positions, faces, nearest, weights))

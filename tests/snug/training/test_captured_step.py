@@ -57,7 +57,9 @@ def equal_states(plain, captured):
     (weights, facts), (theirs, others) = plain.state(), captured.state()
     assert weights.keys() == theirs.keys() and facts.keys() == others.keys()
     assert facts["random"] == others["random"] and facts["contact"] == others["contact"]
-    assert facts["guard"] == others["guard"] | {"usual": pytest.approx(others["guard"]["usual"], rel=1e-5)}
+    assert facts["guard"] == others["guard"] | {
+        "usual": pytest.approx(others["guard"]["usual"], rel=1e-5)
+    }
     for name, tensor in weights.items():
         assert torch.allclose(tensor.double(), theirs[name].double(), rtol=1e-4, atol=1e-6), name
 
@@ -94,7 +96,9 @@ def test_a_batch_that_is_not_followed_is_left_to_single_operations(energy, monke
             )
         assert captured.step(number) == pytest.approx(plain.step(number), rel=1e-5, nan_ok=True)
         if odd:
-            assert captured.guard.summary == plain.guard.summary and plain.guard.summary["high_windows"] > 0
+            assert (
+                captured.guard.summary == plain.guard.summary and plain.guard.summary["high_windows"] > 0
+            )
     assert captured.captured_steps > 0
     equal_states(plain, captured)
 

@@ -124,7 +124,12 @@ STIFF = replace(DRESSED.garment, material=Material(young_modulus=1e6))
         ("snug", {"dressed": DressedBody(DRESSED.body, STIFF)}, (), "another material"),
         ("supervised", {"trajectories": {"sway": DRESSED.skinned(swaying(30))}}, (), "another data"),
         ("snug", {}, (torch, "get_num_threads", lambda: 7), "another threads"),
-        ("snug", {}, (checkpoints, "CHECKPOINT_FORMAT", "snug-checkpoint-99"), "no checkpoint of this vers"),
+        (
+            "snug",
+            {},
+            (checkpoints, "CHECKPOINT_FORMAT", "snug-checkpoint-99"),
+            "no checkpoint of this vers",
+        ),
     ],
 )
 def test_a_checkpoint_of_another_run_is_refused(kind, then, now, message, left, monkeypatch):

@@ -37,23 +37,30 @@ def test_definitions_train_as_the_kernels_do(kind, recipe, monkeypatch):
     monkeypatch.setattr(contact_planes, "REFRESH", 0.0)
     recipe = replace(recipe, window_stride=3 if kind == "snug" else 1)
     fast, slow = (make_trainer(recipe, kind, motions=[swaying(144)], kernels=k) for k in (True, False))
-    if fast.contact and slow.contact:  # the torch search finds the closest face where the walk may be rough
+    if (
+        fast.contact and slow.contact
+    ):  # the torch search finds the closest face where the walk may be rough
         tensors, facts = fast.contact.state()
         changed = torch.arange(fast.data.frames)
         anchors = fast.contact.cache
         held = {"faces": anchors.faces, "barycentric": anchors.barycentric}
-        tensors |= {"changed": changed} | {key: torch.as_tensor(array.copy()) for key, array in held.items()}
+        tensors |= {"changed": changed} | {
+            key: torch.as_tensor(array.copy()) for key, array in held.items()
+        }
         slow.contact.resume(tensors, facts)
     with torch.no_grad():  # off the template and into the skin, so that every term has something to say
         for trainer in (fast, slow):
             generator = torch.Generator().manual_seed(1)
             noise = torch.randn(trainer.network.offsets.weight.shape, generator=generator)
-            trainer.network.offsets.weight += (0.7 if kind == "pbns" else 0.02 / recipe.output_scale) * noise
+            trainer.network.offsets.weight += (
+                0.7 if kind == "pbns" else 0.02 / recipe.output_scale
+            ) * noise
     for number in range(3):
         one, other = fast.step(number), slow.step(number)
         assert one.keys() == other.keys()
         for name, value in one.items():
-            # A foot on the border of two faces may be rounded to either side, and the anchor go another way.
+            # A foot on the border of two faces may be rounded to either side, and the anchor go another
+            # way.
             assert other[name] == pytest.approx(value, rel=5e-5 if name in STATIC else 1e-2), name
     if "collision" in one:
         assert one["collision"] > 1e-4
@@ -64,8 +71,8 @@ def test_definitions_train_as_the_kernels_do(kind, recipe, monkeypatch):
 
 @pytest.mark.parametrize("region", [0.2, 0.06])
 def test_anchors_walk_to_the_closest_skin_by_torch_and_by_kernels(region):
-    """From the anchors of another pose: on one smooth sheet a walk ends where a search ends, unless the rule
-    of regions is so narrow that it stops the walk.
+    """From the anchors of another pose: on one smooth sheet a walk ends where a search ends, unless the
+    rule of regions is so narrow that it stops the walk.
     """
     dressed, motion = tube_dress(), swaying()
     contact, body = ContactPenalty(dressed.cloth), dressed.body
@@ -82,7 +89,15 @@ def test_anchors_walk_to_the_closest_skin_by_torch_and_by_kernels(region):
         TensorContactCache(patch, 2, CPU),
     )
     lanes = to_lanes(x[:, None])
-    on = (contact, lanes, np.zeros_like(lanes), frames[:, None], rows[:, None], positions.numpy(), normals)
+    on = (
+        contact,
+        lanes,
+        np.zeros_like(lanes),
+        frames[:, None],
+        rows[:, None],
+        positions.numpy(),
+        normals,
+    )
     assert fast.energy(*on).sum() > 0 and (fast.faces == still.faces).all()
     fast.energy(*on, walk=True)
     chosen = torch.as_tensor(frames)

@@ -28,7 +28,9 @@ def test_with_weights_that_stand_still_what_is_remembered_becomes_a_roll_out():
                     if (frame - begin) % 3 == 2:
                         kept = trainer.hidden_states.states[:, frame]
                         assert (kept - state[:, 0]).abs().max() < 1e-5 * state.abs().max()
-        assert trainer.hidden_states.states[:, first : first + 2].abs().max() == 0.0  # these end no window
+        assert (
+            trainer.hidden_states.states[:, first : first + 2].abs().max() == 0.0
+        )  # these end no window
 
 
 def test_nothing_is_remembered_where_each_window_has_another_body():

@@ -24,7 +24,9 @@ TOLERANCE = 0.03  # processors round differently; the planted faults are farther
 
 def trained(**changes: object) -> dict[str, float]:
     recipe = replace(RECIPE, **changes)
-    trainer = Trainer("snug", tube_dress(), [swaying(36, degrees=40.0)], steps=STEPS, seed=0, recipe=recipe)
+    trainer = Trainer(
+        "snug", tube_dress(), [swaying(36, degrees=40.0)], steps=STEPS, seed=0, recipe=recipe
+    )
     means = [trainer.step(number) for number in range(STEPS)][-LAST:]
     return {name: float(np.mean([mean[name] for mean in means])) for name in KEPT}
 

@@ -60,7 +60,9 @@ def test_files_that_are_no_models_are_named(tmp_path, monkeypatch):
     monkeypatch.undo()
     with pytest.raises(ModelFileError, match="no model of this project"):
         TrainedModel.load(foreign)
-    with pytest.raises(ModelFileError, match=r"old\.safetensors: format 'snug-model-5', this version reads"):
+    with pytest.raises(
+        ModelFileError, match=r"old\.safetensors: format 'snug-model-5', this version reads"
+    ):
         TrainedModel.load(old)
 
 
@@ -80,7 +82,9 @@ def test_impossible_trainings_are_refused(given, message):
 
 def test_paper_recipe_varies_the_body(monkeypatch):
     trainer, shapes = make_trainer(PAPER), []
-    monkeypatch.setattr(trainer, "learn", lambda number, windows, betas, state: shapes.append(betas) or {})
+    monkeypatch.setattr(
+        trainer, "learn", lambda number, windows, betas, state: shapes.append(betas) or {}
+    )
     for number in range(8):
         trainer.step(number)
     betas = np.concatenate(shapes)

@@ -35,7 +35,9 @@ def test_a_neck_that_hardly_moved_in_training_does_not_drown_the_other_inputs_wh
     trained.poses[:, JOINT["neck"], 0] += np.deg2rad(np.linspace(-2.0, 2.0, 30))
     bent[:, JOINT["neck"], 0] = np.deg2rad(40.0)
     dressed = tube_dress()
-    mean, std = TrainingSet(dressed, [trained], PLAIN, features="pose", sequences=False).input_statistics()
+    mean, std = TrainingSet(
+        dressed, [trained], PLAIN, features="pose", sequences=False
+    ).input_statistics()
     unseen = dressed.features(Motion("bent", bent, np.zeros((1, 3))), PLAIN, feature_set="pose").numpy()
     assert np.abs((unseen - mean) / std).max() < 4.0
 

@@ -44,7 +44,9 @@ def test_mixed_arms_hang_each_at_a_distance_of_its_own_clear_of_the_torso():
 
 
 def test_mixed_thighs_stay_off_the_belly():
-    clips = [make_motion(name) for name in ("squat", "bow")]  # together: a squat's legs under a bowed spine
+    clips = [
+        make_motion(name) for name in ("squat", "bow")
+    ]  # together: a squat's legs under a bowed spine
     mixed = make_mixed_clips(clips, 3000, turn=0.1, lifted=1.0, seed=3)
     nearest = [np.rad2deg(lap_clearance(clip).min()) for clip in [*clips, *mixed]]
     assert min(nearest) > 55.0 and max(nearest) > 70.0  # 3 where nothing opens the hips

@@ -29,7 +29,9 @@ def test_across_a_side_lies_the_face_that_shares_it():
 def test_what_is_no_number_or_not_trusted_moves_no_anchor(kernels):
     trainer = make_trainer(motions=MOTIONS, kernels=kernels)
     contact = trainer.contact
-    before = [torch.as_tensor(table).clone() for table in (contact.cache.faces, contact.cache.barycentric)]
+    before = [
+        torch.as_tensor(table).clone() for table in (contact.cache.faces, contact.cache.barycentric)
+    ]
 
     def kept():
         now = (contact.cache.faces, contact.cache.barycentric)
@@ -58,7 +60,9 @@ def test_a_sampled_shape_is_touched_where_its_body_is(kernels):
     trainer = make_trainer(replace(PLAIN, shape_range=3.0), motions=MOTIONS, kernels=kernels)
     contact = trainer.contact
     betas = np.random.default_rng(2).uniform(-3, 3, (2, 10))
-    batch = trainer.data.batch(np.array([4, 17]), betas)  # windows of the first motion begin at every frame
+    batch = trainer.data.batch(
+        np.array([4, 17]), betas
+    )  # windows of the first motion begin at every frame
     rows, positions, _ = contact.bodies.posed(batch)
     assert sorted(rows.tolist()) == list(range(6))
     expected = [patch_of(contact, MOTIONS[0], slice(f, f + 3), shape) for f, shape in zip((4, 17), betas)]

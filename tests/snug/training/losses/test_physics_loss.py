@@ -91,7 +91,9 @@ def test_hinges_are_those_of_the_recipe(material):
     recipes = [
         Recipe(terms=("bending",), material=material, bending=form) for form in ("length_area", "none")
     ]
-    scaled, printed = (PhysicsLoss(dressed.cloth, r, dt=DT)(x, torch.zeros(1, 3, 3), None) for r in recipes)
+    scaled, printed = (
+        PhysicsLoss(dressed.cloth, r, dt=DT)(x, torch.zeros(1, 3, 3), None) for r in recipes
+    )
     angles = dihedral_angles(x[0, 0].numpy(), dressed.cloth.hinges)
     k, lengths, areas = 3.96e-5, dressed.cloth.hinge_lengths, dressed.cloth.hinge_areas
     assert float(printed["bending"][0, 0]) == pytest.approx(0.5 * k * angles @ angles, rel=1e-12)
@@ -157,8 +159,14 @@ def test_energy_at_anchors_is_that_of_their_planes(recipe):
     transforms = dressed.transforms(motion.poses[[2, 9]])
     skin_now = skin(torch.as_tensor(patch.rest), weights, transforms).numpy()
     garment = skin(dressed.rest(), dressed.weights(5), transforms)
-    x = garment - torch.tensor([0.0, 0.0, 0.05])  # the back a little off the skin, the front deep under it
-    anchors, frames, normals = ContactCache(patch, 3), np.array([2, 0]), byte_normals(skin_now, patch.faces)
+    x = garment - torch.tensor(
+        [0.0, 0.0, 0.05]
+    )  # the back a little off the skin, the front deep under it
+    anchors, frames, normals = (
+        ContactCache(patch, 3),
+        np.array([2, 0]),
+        byte_normals(skin_now, patch.faces),
+    )
     for row, frame in enumerate(frames):
         samples = (contact.sample_matrix @ x[row].numpy()).astype(np.float32)
         anchors.requery(int(frame), samples, skin_now[row])

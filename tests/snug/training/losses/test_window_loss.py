@@ -122,7 +122,9 @@ def test_window_loss_is_the_sum_of_the_papers_formulas(form, frames, copies, ker
 
 def test_a_detached_past_gets_no_gradient_and_the_present_the_same():
     whole, detached = (
-        loss_of(replace(PAPER, terms=("inertia",), inertia_form=form), copies=1, kernels=False, frames=3)[1]
+        loss_of(replace(PAPER, terms=("inertia",), inertia_form=form), copies=1, kernels=False, frames=3)[
+            1
+        ]
         for form in ("equation_5", "detached_past")
     )
     assert not detached[:, :2].any() and whole[:, :2].any()
