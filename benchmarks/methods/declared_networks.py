@@ -1,7 +1,7 @@
 """Networks as methods, their ablations and bounds, in NETWORKS; and the trainings of all of them.
 
 No result depends on these lists, but on the training of its own network alone: a further line makes no
-finished network out of date.
+finished network out of date, though metrics are measured again.
 """
 
 from __future__ import annotations

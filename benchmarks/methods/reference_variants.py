@@ -26,7 +26,8 @@ def of_own_energies(scene: BuiltScene, recipe: Recipe) -> BuiltScene:
 
     Self-contact, which is no energy of a recipe, stays.
     """
-    own = *static_terms(scene.cloth, recipe).values(), make_contact(scene.cloth, recipe)
+    contact = (make_contact(scene.cloth, recipe),) * (scene.obstacle is not None)
+    own = *static_terms(scene.cloth, recipe).values(), *contact
     further = scene.minimised[len(scene.energies) :]
     start = scene.start_state
     return replace(scene, energies=own, minimised=own + further, settle=lambda: start)

@@ -48,7 +48,8 @@ RUNNING = (
 )  # fmt: skip
 MEASURING = (
     *RUNNING, "benchmarks/metrics", "benchmarks/metric.py", "benchmarks/results",
-    "benchmarks/runner/measurements.py",
+    "benchmarks/runner/measurements.py", "benchmarks/methods/declared_networks.py",
+    "benchmarks/methods/own_energies.py", "benchmarks/methods/reference_variants.py",
 )  # fmt: skip
 CASES = (*MEASURING, "benchmarks/validation")
 USERS_OWN = (*MEASURING, "benchmarks/methods")  # what a user's file may import

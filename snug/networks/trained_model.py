@@ -104,8 +104,7 @@ class TrainedModel:
         >>> TrainedModel.load("tshirt-snug")
         Traceback (most recent call last):
         ...
-        snug.networks.trained_model.ModelFileError: tshirt-snug: neither a model file nor a network of the
-        \
+        snug.networks.trained_model.ModelFileError: tshirt-snug: neither a model file nor a network of the \
 package: pbns-tshirt, snug-tshirt, supervised-tshirt
         """
         path = _find_file(path)

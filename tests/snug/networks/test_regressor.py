@@ -107,7 +107,7 @@ def test_closed_forms_hide_no_window_that_is_no_number():
     ("options", "message"),
     [
         ({"pose_input": "quaternion"}, "pose_input='quaternion'"),
-        ({"terms": ("strain", "wind")}, "'wind'"),
+        ({"terms": ("strain", "gale")}, "'gale'"),
         ({"momentum": 0.9}, "'momentum' is unknown or missing"),
     ],
 )

@@ -94,7 +94,7 @@ def test_an_energy_of_the_simulator_that_no_recipe_here_has_can_be_trained():
 @pytest.mark.parametrize(
     ("name", "message"),
     [
-        ("wind", "unknown energy 'wind': use one of area_barrier, bending, gravity, .*spring, .*strain"),
+        ("gale", "unknown energy 'gale': use one of area_barrier, bending, gravity, .*spring, .*strain"),
         ("barrier", "prepared for each step"),
     ],
 )
