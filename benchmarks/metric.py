@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.declarations import load
-from benchmarks.results.protocol import is_member
+from benchmarks.results.protocol import FAMILY
 from benchmarks.results.row import USABLE
 
 if TYPE_CHECKING:
@@ -34,9 +34,9 @@ COMPARED_WITH = ("reference", "reference-variant", "bound")  # roles of what oth
 
 
 class Estimate(NamedTuple):
-    """Number and its uncertainty, in the same unit.
+    """Number and its uncertainty, in the same unit; nan where it is unknown.
 
-    moved: by how much each equally valid simulation, in the place of the reference, changes the number.
+    moved: by how much each member of the reference's family, in its place, changes the number.
     """
 
     value: float
@@ -115,8 +115,8 @@ class Measurements:
         metrics: all that the functions give a number of.
         measure: of a roll-out, name -> value; what does not apply is left out.
         compare: of a roll-out and the reference, name -> value. It is called with each member of the
-            reference's ensemble too (benchmarks.results.protocol): the standard deviation over them is
-            the uncertainty of a number.
+            reference's family too (benchmarks.results.protocol), whose noise is the uncertainty of a
+            number.
         series: of a roll-out, curves beside the trajectory, name -> (T,), or (T,V) of every vertex.
         judge: of a roll-out and its values, status and reason where it failed though it ended well.
         where_named: whether only scenes that name it are measured.
@@ -226,11 +226,6 @@ class SceneRollOuts(Kept):
         return next((roll_out for roll_out in of_role if roll_out.status in USABLE), None)
 
     @property
-    def ensemble(self) -> list[RollOut]:
-        """Members of the reference's ensemble that converged in every frame."""
-        return [
-            roll_out
-            for roll_out in self.roll_outs
-            if is_member(roll_out.entry.reporting.family, roll_out.entry.reporting.level)
-            and roll_out.status == "ok"
-        ]
+    def family(self) -> list[RollOut]:
+        """Members of the reference's family that converged in every frame."""
+        return [r for r in self.roll_outs if r.entry.name in FAMILY and r.status == "ok"]

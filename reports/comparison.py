@@ -6,7 +6,7 @@ A network is tested in each scene over its seeds. Three seeds say little of thei
 is pooled over the scenes of the method, and a scene that scatters more has its own. A scene that scatters
 far more than most stays out of the pool: one motion on which seeds disagree would hide changes of all
 others. The test is Student's with the pooled degrees of freedom, corrected by Bonferroni for all of these
-tests. A method without seeds is compared with the uncertainty that the reference's ensemble leaves.
+tests. A method without seeds is compared with the noise of the reference.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ ONCE = 2.0  # factor of a time that was taken once: below it another load of the
 FLOOR = (
     1e-4  # share of the median method's value; a smaller difference is none, whatever it is a share of
 )
-SPREADS = 3.0  # of the reference's ensemble, beyond which an answer that nothing repeats has changed
+SPREADS = 3.0  # times the reference's noise, beyond which an answer that nothing repeats has changed
 
 
 @dataclass(frozen=True)
@@ -363,7 +363,7 @@ def _cells(run: Run) -> pd.DataFrame:
     timed = frame["metric"].isin((TIME, WHOLE))  # inference alone is repeated, its inputs are not
     apart = (inference * repeats / 100.0).reindex(pd.MultiIndex.from_frame(frame.loc[timed, cell]))
     frame.loc[timed, "uncertainty"] = apart.to_numpy()
-    # Another run has another reference ensemble: uncertainties add up.
+    # Another run has another reference: uncertainties add up.
     return frame[frame["metric"] != REPEATS].drop(columns="moved")
 
 

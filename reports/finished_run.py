@@ -13,7 +13,7 @@ import pandas as pd
 
 from benchmarks.metric import Metric
 from benchmarks.results import run_folder
-from benchmarks.results.protocol import is_member, one_protocol
+from benchmarks.results.protocol import FAMILY, one_protocol
 from benchmarks.results.row import COLUMNS, OPTIONAL_NUMBERS, ROLES, USABLE, ResultsError, Row
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.files.array_file import read_arrays
@@ -174,9 +174,9 @@ class Run:
         return next(iter(self.with_role("reference")), "")
 
     @property
-    def reference_ensemble(self) -> list[str]:
-        """Members of the reference's ensemble, whose spread is its uncertainty."""
-        return [name for name, method in self.methods.items() if is_member(method.family, method.level)]
+    def reference_family(self) -> list[str]:
+        """Members of the reference's family, which take its place in turn."""
+        return [name for name in self.methods if name in FAMILY]
 
     def label(self, method: str) -> str:
         """Return the method's name for people."""

@@ -9,7 +9,7 @@ from functools import lru_cache
 import pandas as pd
 
 from reports.finished_run import Run
-from reports.statistics.means_and_spreads import ensemble_spread
+from reports.statistics.means_and_spreads import error_of_twin
 from reports.statistics.outcomes import BAD, EXTERNAL, LEARNED, counted, leads
 from reports.statistics.paper_claims import counts, in_words, judged
 from reports.statistics.pareto import indistinct
@@ -81,7 +81,7 @@ def _certainty(run: Run, worn: pd.DataFrame) -> str:
         sentences.append(
             "Equally valid simulations (another start, contact search or tolerance) lie "
             f"{number(distance, 2)} mm and {number(curvature, 2)} 1/m of mean curvature from the reference, "
-            f"{in_scenes(set(ensemble_spread(run, worn, DISTANCE).index))}: errors below that show no "
+            f"{in_scenes(set(error_of_twin(worn, DISTANCE).index))}: errors below that show no "
             "difference."
         )
     return " ".join(sentences)

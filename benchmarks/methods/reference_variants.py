@@ -55,6 +55,6 @@ def make_own_reference(*, models: Path, seed: int, **options: Any) -> Simulation
     return Simulation(STATIC, change=change)
 
 
-def make_perturbed_start(*, models: Path, seed: int, shift: float) -> Simulation:
-    """Make the reference from a start perturbed by `shift` [m]."""
-    return Simulation(change=partial(of_perturbed_start, shift=shift))
+def make_perturbed_start(*, models: Path, seed: int, shift: float, **options: Any) -> Simulation:
+    """Make the reference from a start perturbed by `shift` [m], with options of its steps."""
+    return Simulation(options, partial(of_perturbed_start, shift=shift))

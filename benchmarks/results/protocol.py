@@ -1,4 +1,4 @@
-"""Protocol: its number and digests, the ensemble of the reference, and the rules of verdicts of reports.
+"""Protocol: its number and digests, the family of the reference, and the rules of verdicts of reports.
 
 The number stands for all that a result depends on and that no method brings itself. Two numbers of the
 same protocol can stand in one table.
@@ -7,7 +7,7 @@ same protocol can stand in one table.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 from benchmarks.provenance import digest
 from benchmarks.results.row import ResultsError
@@ -54,37 +54,33 @@ def one_protocol(protocols: Iterable[str], where: object) -> str:
     return numbers[0] if numbers else ""
 
 
-# Family and level of each member: a start perturbed by 1e-4 m, contact planes searched twice in each
-# step, a tolerance a hundred times tighter. A simulation with another time step is none: it solves
-# another problem.
-MEMBERS = {
-    "simulation-perturbed-1e-4": ("simulation-perturbed", 1e-4),
-    "simulation-refrozen": ("simulation-refrozen", None),
-    "simulation-1e-8": ("simulation-tolerance", 1e-8),
+# Time steps a frame -> the simulations with that step from two starts, the second moved by 1e-4 m. Both
+# are equally valid answers to one problem, so what they differ by is the noise of a number. Simulations
+# with other time steps solve other problems: what a number changes by from one to the other is a trend,
+# no noise.
+STARTS = {1: ("simulation", "simulation-perturbed-1e-4")} | {
+    steps: (f"simulation-dt/{steps}", f"simulation-dt/{steps}-perturbed-1e-4") for steps in (2, 4, 8)
 }
-LEAST_MEMBERS = 2  # of which a spread is taken
+REFERENCE = STARTS[1][0]
+SECOND_STARTS = tuple(two for _, two in STARTS.values())
+FAMILY = tuple(name for names in STARTS.values() for name in names if name != REFERENCE)
 
 
-def is_member(family: str, level: float | None) -> bool:
-    """Return whether methods of that family and level belong to the ensemble.
+def noise(moved: Mapping[str, float]) -> float | None:
+    """Return the standard deviation of a number over equally valid references; None without two starts.
 
-    >>> is_member("simulation-refrozen", None), is_member("simulation-perturbed", 1e-9)
-    (True, False)
+    It is the root mean square, over the time steps, of the difference between two starts, divided by the
+    root of 2. moved: by how much each member of FAMILY changes the number when it takes the reference's
+    place.
+
+    >>> noise({"simulation-perturbed-1e-4": 0.2}), noise({"simulation-dt/2": 0.3})
+    (0.14142135623730953, None)
     """
-    return (family, level) in MEMBERS.values()
+    known = {REFERENCE: 0.0, **moved}
+    apart = [known[one] - known[two] for one, two in STARTS.values() if {one, two} <= known.keys()]
+    return math.sqrt(sum(x * x for x in apart) / (2 * len(apart))) if apart else None
 
 
-def spread(changes: Iterable[float]) -> float | None:
-    """Return the standard deviation (n - 1) of a number over the reference and the members of its ensemble.
-
-    changes: by how much each member changes the number when it takes the reference's place. None for
-    fewer than LEAST_MEMBERS.
-
-    >>> spread([0.1, -0.1]), spread([0.1])
-    (0.1, None)
-    """
-    values = [0.0, *changes]
-    if len(values) <= LEAST_MEMBERS:
-        return None
-    mean = sum(values) / len(values)
-    return math.sqrt(sum((value - mean) ** 2 for value in values) / (len(values) - 1))
+def trend(moved: Mapping[str, float]) -> dict[str, float]:
+    """Return the changes by simulations with smaller time steps alone."""
+    return {name: change for name, change in moved.items() if name not in STARTS[1]}

@@ -53,10 +53,9 @@ class Row:
         status, reason: `ok`, `diverged`, `stalled`, `timeout`, `out-of-memory`, `failed` or `skipped`,
             and why. A skipped row has a reason and no value.
         expected, tolerance: of a validation case.
-        uncertainty: standard deviation of the value over the reference ensemble, or its standard error as
-            a sample of frames, in the unit of the value.
-        moved: change of the value by each member of the reference ensemble in the reference's place, as
-            JSON.
+        uncertainty: noise of the value, of what the start of the reference changes, or its standard error
+            as a sample of frames, in the unit of the value.
+        moved: change of the value by each member of the reference's family in its place, as JSON.
         preset, commit, hardware, dtype, threads: origin.
         protocol: number of the protocol; `own` where scene, metric or settings are a user's.
         terms: energies of the scene, joined by `+`.

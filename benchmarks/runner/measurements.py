@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import numbers
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -13,7 +14,7 @@ import numpy as np
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts, measurements_in
 from benchmarks.metrics import MEASUREMENTS, find_metric, measured_in
 from benchmarks.plan.cell import Cell, id_of
-from benchmarks.results.protocol import spread
+from benchmarks.results.protocol import noise
 from benchmarks.results.row import STATUSES, USABLE
 from benchmarks.results.run_folder import SECONDS
 from benchmarks.runner.cells import build_scene
@@ -130,17 +131,18 @@ def number(metric: str, value: Any) -> float | Estimate:
 def compared(
     roll_out: RollOut, compare: Callable[[RollOut, RollOut], dict[str, float]]
 ) -> dict[str, float | Estimate]:
-    """Return the numbers against the reference, with their change against each member of its ensemble."""
+    """Return the numbers against the reference, with their change against each member of its family."""
     if roll_out.reference is None:
         return {}
     values = compare(roll_out, roll_out.reference)
-    twins = [other for other in roll_out.group.ensemble if other is not roll_out]
+    twins = [other for other in roll_out.group.family if other is not roll_out]
     others = {other.entry.name: compare(roll_out, other) for other in twins}
     estimates: dict[str, float | Estimate] = {}
     for name, value in values.items():
-        moved = tuple((twin, beside[name] - value) for twin, beside in others.items() if name in beside)
-        uncertainty = spread(change for _, change in moved)
-        estimates[name] = value if uncertainty is None else Estimate(value, uncertainty, moved)
+        moved = {twin: beside[name] - value for twin, beside in others.items() if name in beside}
+        known = noise(moved)
+        uncertainty = math.nan if known is None else known
+        estimates[name] = Estimate(value, uncertainty, tuple(moved.items())) if moved else value
     return estimates
 
 

@@ -12,7 +12,7 @@ from benchmarks.method import MethodEntry
 from benchmarks.metrics import find_metric
 from benchmarks.plan.cell import Cell, TaskId
 from benchmarks.plan.plan import Plan, network_of, protocol_of, protocol_of_case
-from benchmarks.results.protocol import OWN, is_member, spread
+from benchmarks.results.protocol import FAMILY, OWN, noise
 from benchmarks.results.row import DECLARED, PRETRAINED, Row
 from benchmarks.runner.networks import NAME
 from benchmarks.runner.task import Outcome, Task
@@ -205,22 +205,22 @@ def _origin(outcome: Outcome, protocol: str) -> dict[str, Any]:
 
 
 def with_uncertainty(rows: Sequence[Row], outside: tuple[str, ...] = ()) -> list[Row]:
-    """Return the rows, those of the reference with their spread over its ensemble.
+    """Return the rows, those of the reference with their noise, and what the family changes.
 
     Of answers, and not of what has an uncertainty of its own. outside: where further metrics are
     declared.
     """
     others: dict[tuple[str, str], dict[str, float]] = {}
     for row in rows:
-        if is_member(row.family, row.level) and row.status == "ok" and row.value is not None:
+        if row.method in FAMILY and row.status == "ok" and row.value is not None:
             others.setdefault((row.scene, row.metric), {})[row.method] = row.value
 
-    def with_ensemble(row: Row) -> Row:
-        ensemble = others.get((row.scene, row.metric), {})
+    def with_family(row: Row) -> Row:
+        family = others.get((row.scene, row.metric), {})
         answer = row.role == "reference" and find_metric(row.metric, outside).of == "answer"
-        if not answer or row.uncertainty is not None or row.value is None or not ensemble:
+        if not answer or row.uncertainty is not None or row.value is None or not family:
             return row
-        moved = tuple((twin, value - row.value) for twin, value in ensemble.items())
-        return dataclasses.replace(row, uncertainty=spread(change for _, change in moved), moved=moved)
+        moved = {twin: value - row.value for twin, value in family.items()}
+        return dataclasses.replace(row, uncertainty=noise(moved), moved=tuple(moved.items()))
 
-    return [with_ensemble(row) for row in rows]
+    return [with_family(row) for row in rows]

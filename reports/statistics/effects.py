@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cache
 
 import numpy as np
 
-from benchmarks.results.protocol import DRAWS, LEAST_MEMBERS, LEVEL, SEED, SOFTENING, TIE, spread
+from benchmarks.results.protocol import DRAWS, LEVEL, SEED, SOFTENING, TIE, noise, trend
 from reports.statistics.means_and_spreads import Mean
 
 RATIO, EXCESS, DIFFERENCE = "ratio", "excess", "difference"  # scales
@@ -60,8 +60,9 @@ class Effect:
         limits: of costs, the least and the greatest of what was measured, on the scale.
         possible: the least and the greatest effect that there can be, which cut the interval.
         least_p: p-value below which no test of so few motions can go.
-        uncertainty: standard deviation of the value over the reference's ensemble; 0 where no member
-            changes it, or none ran.
+        uncertainty: noise of the value, of what the start of the reference changes; 0 where that is
+            unknown.
+        against: change of the value by each simulation with smaller time steps in the reference's place.
         unit: of a plain difference, what 1 is of: TIE of it is no difference; 0 where that is unknown.
         complete: neither mean lacks a scene or a seed.
         one_seed: whether a mean is of one seed, and nobody knows how far another would move it.
@@ -80,6 +81,7 @@ class Effect:
     possible: tuple[float, float] = (-math.inf, math.inf)
     least_p: float = 0.0
     uncertainty: float = 0.0
+    against: Mapping[str, float] = field(default_factory=dict)
     unit: float = 0.0
     complete: bool = True
     one_seed: bool = False
@@ -140,6 +142,11 @@ class Effect:
         ends = self.ends
         return ends is not None and all(abs(end + self.shift(factor)) <= self.margin for end in ends)
 
+    def turned_by(self, factor: float = 1.0) -> list[str]:
+        """Return the simulations with smaller time steps against which the effect has the other sign."""
+        above = self.above(factor)
+        return [name for name, change in self.against.items() if (above + change) * above <= 0.0]
+
     def _shown(self, value: float) -> float:
         if self.scale == EXCESS:  # points between typical shares of the two
             first, second = self.second + self.value, self.second
@@ -189,6 +196,8 @@ def effect(one: Mean, other: Mean, scale: str = "", *, unit: float | None = None
         "motions": any((grid != grid[:1]).any() for grid in grids),
         "seeds": any((grid != grid[:, :1]).any() for grid in grids),
     }
+    changes = _changes(one, other, scale)
+    known = noise(changes)
     error, freedom = _bootstrap(grids) if any(repeated.values()) else (None, math.inf)
     return Effect(
         value=float(first.mean() - second.mean()),
@@ -198,7 +207,8 @@ def effect(one: Mean, other: Mean, scale: str = "", *, unit: float | None = None
         freedom=freedom,
         covers=" and ".join(name for name, several in repeated.items() if several),
         motions=len(first),
-        uncertainty=_over_ensemble(one, other, scale),
+        uncertainty=_unpaired(one, other, scale) if known is None else known,
+        against=trend(changes),
         unit=max(abs(one.value), abs(other.value)) if unit is None else unit,
         complete=one.complete and other.complete,
         one_seed=_one_seed(one, other) or _one_seed(other, one),
@@ -232,24 +242,23 @@ def _one_seed(mean: Mean, beside: Mean) -> bool:
     return mean.seeded and mean.seeds == 1 and not (beside.seeded and beside.seeds > 1)
 
 
-def _over_ensemble(one: Mean, other: Mean, scale: str) -> float:
-    """Return the standard deviation of the effect's value over the reference and its ensemble, on the scale.
+def _changes(one: Mean, other: Mean, scale: str) -> dict[str, float]:
+    """Return the change of the effect's value by each member of the reference's family, on the scale.
 
-    Each member takes the reference's place in every scene at once, so only members that converged in all
-    of them count. Where fewer than LEAST_MEMBERS did, or single changes are unknown, as between two runs
-    with ensembles of their own, both uncertainties add up as independent ones.
+    A member takes the reference's place in every scene at once, so only those count that converged in
+    all.
     """
     in_scenes = [
         mean.moved.get(cell, {}).keys() for mean in (one, other) if mean.moved for cell in mean.cells
     ]
     names = set.intersection(*map(set, in_scenes)) if in_scenes else set()
-    if len(names) < LEAST_MEMBERS:
-        slopes = [_slope(mean, scale) for mean in (one, other)]
-        return math.hypot(
-            *(slope * (mean.uncertainty or 0.0) for slope, mean in zip(slopes, (one, other)))
-        )
-    changes = [_moved_by(one, name, scale) - _moved_by(other, name, scale) for name in sorted(names)]
-    return spread(changes) or 0.0
+    return {name: _moved_by(one, name, scale) - _moved_by(other, name, scale) for name in sorted(names)}
+
+
+def _unpaired(one: Mean, other: Mean, scale: str) -> float:
+    """Return the noise where single changes are unknown, as between two runs: both add up as independent."""
+    slopes = [_slope(mean, scale) for mean in (one, other)]
+    return math.hypot(*(slope * (mean.uncertainty or 0.0) for slope, mean in zip(slopes, (one, other))))
 
 
 def _slope(mean: Mean, scale: str) -> float:
@@ -260,7 +269,7 @@ def _slope(mean: Mean, scale: str) -> float:
 
 
 def _moved_by(mean: Mean, name: str, scale: str) -> float:
-    """Return by how much a member of the ensemble changes the mean on the scale."""
+    """Return by how much a member of the family changes the mean on the scale."""
     changes: dict[tuple[str, int], float] = {}
     for cell, value in mean.cells.items():
         moved = value + mean.moved.get(cell, {}).get(name, 0.0)

@@ -19,7 +19,7 @@ from typing import Any
 import pandas as pd
 
 from benchmarks.metric import Metric
-from benchmarks.results.protocol import LEAST_MEMBERS
+from benchmarks.results.protocol import SECOND_STARTS
 from reports.finished_run import Run
 
 
@@ -181,28 +181,25 @@ AT_REFERENCE = {
 }  # fmt: skip
 
 
-def ensemble_spread(run: Run, rows: pd.DataFrame, metric: str) -> pd.Series:
-    """Return scene -> root mean square error against the reference over the members of its ensemble.
-
-    Of members that converged; scenes with fewer than LEAST_MEMBERS of these are left out.
-    """
+def error_of_twin(rows: pd.DataFrame, metric: str) -> pd.Series:
+    """Return scene -> error against the reference of its twin from another start, where that converged."""
     kept = rows[(rows["metric"] == metric) & rows["usable"] & (rows["status"] == "ok")]
-    members = kept[kept["method"].isin(run.reference_ensemble)]
-    squares = (members["value"] - AT_REFERENCE.get(metric, 0.0)) ** 2
-    of_scene = squares.groupby(members["scene"], observed=True)
-    return of_scene.mean()[of_scene.size() >= LEAST_MEMBERS] ** 0.5
+    twin = kept[kept["method"] == SECOND_STARTS[0]]
+    return (
+        (twin["value"] - AT_REFERENCE.get(metric, 0.0)).abs().groupby(twin["scene"], observed=True).mean()
+    )
 
 
 def in_spreads(run: Run, rows: pd.DataFrame, method: str, metric: str) -> float | None:
-    """Return how many spreads of the reference's ensemble a method is away from the reference.
+    """Return how far a method is from the reference, in errors of its twin from another start.
 
-    In each scene the spread is `ensemble_spread`, and the method's error the root mean square over its
+    In each scene the spread is `error_of_twin`, and the method's error the root mean square over its
     seeds. The result is the mean error of the scenes over their mean spread; None where no scene has a
     spread.
     """
     kept = rows[(rows["metric"] == metric) & rows["usable"] & (rows["method"] == method)]
     squares = (kept["value"] - AT_REFERENCE[metric]) ** 2
-    spread = ensemble_spread(run, rows, metric)
+    spread = error_of_twin(rows, metric)
     error = squares.groupby(kept["scene"], observed=True).mean() ** 0.5
     both = spread.index.intersection(error.index)
     total = float(spread[both].sum())

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import pandas as pd
 
 from reports.finished_run import Run
-from reports.statistics.means_and_spreads import ensemble_spread, mean_of, means
+from reports.statistics.means_and_spreads import error_of_twin, mean_of, means
 
 TIME, REPEATS = "cost/frame", "cost/spread"
 WHOLE = "cost/whole"  # TIME is a method's own work; this is all from pose to world vertices
@@ -32,7 +32,7 @@ class Point:
 
     time_spread: how far runs lie apart [ms]: largest less smallest repeat where it was repeated, else two
     standard deviations over seeds. error_spread: one standard deviation over seeds or, where that is
-    more, the spread over the reference's ensemble. Both 0 where unknown.
+    more, the noise of the reference. Both 0 where unknown.
     fewer: remark on seeds that are missing, empty where none is.
     """
 
@@ -120,8 +120,8 @@ def truncated(run: Run, points: Iterable[Point]) -> list[Point]:
 def indistinct(run: Run, rows: pd.DataFrame, metric: str) -> float:
     """Return the error [unit of the metric] below which a method cannot be told from the reference.
 
-    It is the spread of the reference's ensemble, the mean of scenes; of the energy gap what the reference
-    leaves on contact planes searched at its end. 0 where none is known.
+    It is the error of the reference's twin from another start, the mean of scenes; of the energy gap what
+    the reference leaves on contact planes searched at its end. 0 where none is known.
     """
     if metric in PLANES:
         kept = rows[
@@ -129,7 +129,7 @@ def indistinct(run: Run, rows: pd.DataFrame, metric: str) -> float:
         ]
         of_scene = kept.groupby("scene", observed=True)["value"].mean().abs()
     else:
-        of_scene = ensemble_spread(run, rows, metric)
+        of_scene = error_of_twin(rows, metric)
     return float(of_scene.mean()) if len(of_scene) else 0.0
 
 

@@ -68,7 +68,7 @@ def with_relative_excess(
     that have relative excesses of the metric already come back as they are.
 
     Args:
-        run: declares the reference and its ensemble, of which members that stalled are left out.
+        run: declares the reference and its family, of which members that stalled are left out.
         rows: of the run, as Run.frame.
         metric: an energy.
         basis: rows whose reference and skinning are the basis; those given by default.
@@ -76,9 +76,9 @@ def with_relative_excess(
     if (rows["metric"] == relative_metric(metric).name).any():
         return rows
     basis = rows if basis is None else basis
-    sound = basis[(basis["status"] == "ok") | ~basis["method"].isin(run.reference_ensemble)]
-    zeros = _values(sound, metric, [run.reference, *run.reference_ensemble])
-    totals = _values(sound, TOTAL, [run.reference, *run.reference_ensemble, SKINNING])
+    sound = basis[(basis["status"] == "ok") | ~basis["method"].isin(run.reference_family)]
+    zeros = _values(sound, metric, [run.reference, *run.reference_family])
+    totals = _values(sound, TOTAL, [run.reference, *run.reference_family, SKINNING])
     lines = rows[(rows["metric"] == metric) & rows["usable"]]
     parts = []
     columns = (lines[name].tolist() for name in ("scene", "method", "value", "uncertainty"))
@@ -110,7 +110,7 @@ def _values(rows: pd.DataFrame, metric: str, methods: Sequence[str]) -> dict[str
 
 
 def _shares(value: float, zeros: Mapping[str, float], totals: Mapping[str, float]) -> dict[str, float]:
-    """Return reference -> relative excess [%] by the reference and by each member of its ensemble."""
+    """Return reference -> relative excess [%] by the reference and by each member of its family."""
     return {
         name: 100.0 * (value - zeros[name]) / (totals[SKINNING] - totals[name])
         for name in zeros.keys() & totals.keys()
@@ -147,7 +147,7 @@ class Excess:
 
     @property
     def uncertainty(self) -> float:
-        """Standard deviation of the typical value over the reference's ensemble."""
+        """Noise of the typical value, of what the start of the reference changes."""
         return self.effect.uncertainty * math.hypot(SOFTENING, self.typical)
 
     @property

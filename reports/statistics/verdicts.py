@@ -2,9 +2,10 @@
 
 The rule looks at an effect (reports.statistics.effects) and, of an answer, at its corrected p-value:
 
-    tie            all of the interval lies within the margin: 5 %, or what the reference's ensemble
-                   leaves uncertain if that is more
-    less, more     p is below 0.05, and the difference exceeds the reference's uncertainty
+    tie            all of the interval lies within the margin: 5 %, or the noise of the reference if that
+                   is more
+    less, more     p is below 0.05, the difference exceeds the reference's noise, and has the same sign
+                   against each simulation with smaller time steps
     inconclusive   anything else; fewer than LEAST_MOTIONS motions; a network of one seed
 
 Costs are not tested: their range over motions and seeds lies on one side, within the margin, or on both.
@@ -89,7 +90,7 @@ def standing(far: Effect, p: float | None, factor: float = 1.0) -> str:
         return _standing_of_range(far, factor)
     if far.equal(factor):
         return TIED
-    if p is None or p >= LEVEL or abs(far.above(factor)) <= far.uncertainty:
+    if p is None or p >= LEVEL or abs(far.above(factor)) <= far.uncertainty or far.turned_by(factor):
         return OPEN
     return LESS if far.above(factor) < 0.0 else MORE
 
@@ -105,6 +106,16 @@ def untested(far: Effect) -> str:
     if far.one_seed:
         return ": one seed"
     return f": fewer than {LEAST_MOTIONS} motions" if far.motions < LEAST_MOTIONS else ""
+
+
+def why_open(far: Effect, factor: float = 1.0) -> str:
+    """Return why an effect is inconclusive, as a remark behind it: untested, or turned by smaller steps.
+
+    >>> why_open(Effect(0.5, "ratio", motions=20, against={"simulation-dt/8": -0.6}))
+    ': other sign against simulation-dt/8'
+    """
+    turned = ", ".join(far.turned_by(factor))
+    return untested(far) or (f": other sign against {turned}" if turned else "")
 
 
 def _standing_of_range(far: Effect, factor: float) -> str:

@@ -19,17 +19,17 @@ from reports.statistics.relative_excess import (
     own_excess_of,
     with_relative_excess,
 )
-from reports.statistics.verdicts import measure_of, standing, untested
+from reports.statistics.verdicts import OPEN, measure_of, standing, why_open
 from reports.tables.table import GARMENT, METHOD, SCENE, SUITE, Cell, Column, Table, table
 
 CLAIMS_NOTE = (
     "Effect: × the first over the second, of geometric means; of energies whose zero is a choice, points of "
     "relative excess between the two; of frames, the first's share less half. Below: the 95 % interval over "
     "motions and seeds (of points with the mean nearer to 0 held), of costs the range. p: of primary claims "
-    "by Holm for the whole family. Tie: all of the interval within 5 % of equality, or within the spread of "
-    "the reference's ensemble if that is wider. A claim is decided where p < 0.05 and the difference exceeds "
-    "that spread; of costs where the range lies on one side. Inconclusive: anything else, fewer than four "
-    "motions, a network of one seed."
+    "by Holm for the whole family. Tie: all of the interval within 5 % of equality, or the noise of the "
+    "reference if that is wider. A claim is decided where p < 0.05, the difference exceeds that noise and "
+    "has the same sign against simulations with smaller time steps; of costs where the range lies on one "
+    "side. Inconclusive: anything else, fewer than four motions, a network of one seed."
 )
 
 
@@ -63,8 +63,9 @@ def findings(run: Run) -> list[Table]:
 
 EXCESS_NOTE = (
     "Typical: mean over motions and seeds of arcsinh(x / 1 %), taken back: a geometric mean well above 1 %, "
-    "arithmetic well below. Segments of a recording count as one motion. Uncertain by: the spread over the "
-    "reference's ensemble. Energy: more or less where p < 0.05 and the difference exceeds that spread."
+    "arithmetic well below. Segments of a recording count as one motion. Uncertain by: the noise, of what "
+    "the start of the reference changes. Energy: more or less where p < 0.05, the difference exceeds that "
+    "noise, and it has the same sign against each simulation with smaller time steps."
 )
 
 
@@ -97,7 +98,8 @@ def relative_excess(run: Run) -> list[Table]:
 def _cells_of(excess: Excess) -> tuple[Cell, ...]:
     """Return the cells of a method in table relative_excess."""
     worst, most = excess.worst
-    stands = standing(excess.effect, excess.effect.p_value()) + untested(excess.effect)
+    stands = standing(excess.effect, excess.effect.p_value())
+    stands += why_open(excess.effect) if stands == OPEN else ""
     return (
         excess.effect, excess.typical_of(recorded=True), excess.typical_of(recorded=False), excess.pooled,
         excess.mean, most, worst.partition("/")[2] or worst, excess.uncertainty or None,
@@ -112,7 +114,7 @@ def _error_title(metric: Metric) -> str:
 
 
 def errors_in_spreads(run: Run) -> list[Table]:
-    """Tabulate distances, curvature errors and dynamics in spreads of the reference's ensemble."""
+    """Tabulate distances, curvature errors and dynamics in errors of another start of the reference."""
     metrics = [run.metrics[name] for name in AT_REFERENCE if name in run.metrics]
     variants = set(run.with_role("reference", "reference-variant"))
     lines: list[tuple[Cell, ...]] = []

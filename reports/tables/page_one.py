@@ -154,15 +154,13 @@ def reference_uncertainty(run: Run) -> list[Table]:
     scenes = reference_scenes(run)
     rows = frame[frame["scene"].isin(scenes)]
     metrics = [run.metrics[name] for name in (*OF_STEPS, *UNCERTAIN) if name in run.metrics]
-    ensemble = [
+    twin = [
         None if metric.name in OF_STEPS else indistinct(run, rows, metric.name) or None
         for metric in metrics
     ]
-    lines: list[tuple[Cell, ...]] = [
-        ("ensemble of the reference, root mean square", *[None] * len(scenes), *ensemble)
-    ]
+    lines: list[tuple[Cell, ...]] = [("the reference from another start", *[None] * len(scenes), *twin)]
     steps = [m for m in run.methods.values() if m.family == SMALLER_STEPS and m.level]
-    if not (steps or any(value is not None for value in ensemble)):
+    if not (steps or any(value is not None for value in twin)):
         return []
     labels = {m.name: f"{m.level:g} steps a frame" for m in sorted(steps, key=lambda m: m.level or 0.0)}
     labels |= {name: run.label(name) for name in (run.reference, NETWORK, "pbns")}
@@ -179,6 +177,6 @@ def reference_uncertainty(run: Run) -> list[Table]:
     columns = (Column("of", "Simulation or network", text=True), *of_scenes, *map(metric_column, metrics))
     caption = (
         f"Reference, simulations with smaller time steps, and networks in {', '.join(scenes)}. Errors below "
-        "the ensemble's are as small as those of another valid simulation."
+        "the twin's from another start are as small as those of another valid simulation."
     )
     return table("reference_uncertainty", columns, lines, caption)

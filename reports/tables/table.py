@@ -227,7 +227,7 @@ def remarks_below(table: Table, lines: Sequence[Sequence[CellText]]) -> str:
         seeds = sorted({mean.seeds for mean in means if mean.spread is not None})
         kinds.append(f"standard deviation over {' or '.join(map(str, seeds))} seeds")
     if any(mean.uncertainty for mean in means):
-        kinds.append("the spread of the reference's ensemble, or a sample's error")
+        kinds.append("the noise of the reference, or a sample's error")
     if kinds:
         lone = any(m.spread_or_uncertainty is None for m in means)
         without = " Without it: one seed, or nothing random." if lone and len(kinds) == 1 else ""

@@ -72,10 +72,9 @@ METRIC_FAULTS = {
               "np.abs((here * of_nearest).sum(axis=1))"),
     ),
     "test_uncertainty": (
-        Fault("spread without the reference", "spread", "values = [0.0, *changes]",
-              "values = [*changes]"),
-        Fault("smaller steps are in the ensemble", "MEMBERS",
-              '("simulation-tolerance", 1e-8)', '("simulation-dt", 8)'),
+        Fault("noise of one start as of two", "noise", "(2 * len(apart))", "len(apart)"),
+        Fault("a smaller step is noise", "noise", "for one, two in STARTS.values() if",
+              "for one in known for two in known if one != two and"),
         Fault("energies of the warm-up", "measure_energy", "series[roll_out.judged].mean()",
               "series[2:].mean()"),
         Fault("common dynamics by the own static answer", "compare", "common = hem.measure(x)",

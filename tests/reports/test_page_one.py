@@ -9,7 +9,7 @@ from reports.statistics.outcomes import leads
 from tests.reports.report_folder import SCENES, all_rows, row, run_of
 from tests.reports.tables.test_tables import on_two_scenes
 
-MEMBERS = ("simulation-perturbed-1e-4", "simulation-1e-8")  # of the reference's ensemble
+MEMBERS = ("simulation-perturbed-1e-4", "simulation-dt/4")  # of the reference's family
 # Skinning has 10 J more than the simulation in either scene.
 BESIDE = [*on_two_scenes("simulation", 0.5, 7.0), *on_two_scenes("skinning", 10.5, 17.0)]
 SNUG = on_two_scenes("snug", 1.0, 9.0)  # 5 and 20 % of skinning's excess
@@ -39,7 +39,7 @@ def test_the_sentences_of_page_one():
     made = headline(run_of(of_all([*SNUG, *BESIDE, *PBNS])))
     assert " ".join(f"{topic}: {text}" for topic, text in made).split() == SENTENCES.split()
     assert [topic for topic, _ in headline(run_of(BESIDE[:2]))] == ["How it ended"]
-    # A member of the reference's ensemble is no rival, however near it is.
+    # A member of the reference's family is no rival, however near it is.
     more = on_two_scenes(MEMBERS[0], 0.5, 7.0)
     assert said("How near", SNUG + BESIDE + more) == said("How near", SNUG + BESIDE)
 

@@ -11,13 +11,14 @@ from benchmarks.methods import find_method
 from benchmarks.metrics import curvature, dynamics, energy
 from benchmarks.metrics import penetration_and_distances as geometry
 from benchmarks.metrics.dynamics import HemMotion
+from benchmarks.results.protocol import FAMILY, STARTS, noise, trend
 from benchmarks.results.row import Row
 from benchmarks.runner.measurements import compared, measured
 from benchmarks.runner.rows import with_uncertainty
 from tests.benchmarks.runner.tasks_by_hand import grouped, prepared, small_scene
 
 EAST = np.array([1.0, 0.0, 0.0])
-TWINS = ("simulation-refrozen", "simulation-perturbed-1e-4", "simulation-1e-8")
+TWIN, SMALLER = "simulation-perturbed-1e-4", "simulation-dt/2"
 
 
 def swaying(scene, frames=6):
@@ -29,19 +30,35 @@ def test_the_uncertainty_of_a_distance_is_what_another_right_simulation_changes(
     scene = small_scene("hanging_sheet", cells=4)
     x = swaying(scene)
     shifts = {
-        "simulation": 0.0, "simulation-refrozen": 0.001, "simulation-perturbed-1e-4": -0.004,
-        "simulation-dt/2": 0.05, "simulation-perturbed-1e-9": 0.3, "newton-1": 0.01,
+        "simulation": 0.0, TWIN: -0.004, SMALLER: 0.002, "simulation-refrozen": 0.001,
+        "simulation-perturbed-1e-9": 0.3, "newton-1": 0.01,
     }  # fmt: skip
     group = grouped(scene, {name: x + shift * EAST for name, shift in shifts.items()})
     metrics = compared(group.roll_outs[-1], geometry.compare)
     value, uncertainty, moved = metrics["distance/rms"]
-    assert (value, uncertainty) == pytest.approx((10.0, 7.0**0.5))  # of 0, -1 and 4
-    assert dict(moved) == pytest.approx({TWINS[0]: -1.0, "simulation-perturbed-1e-4": 4.0})
-    # A member is compared with the others, not with itself: with one, whose spread nobody knows.
-    assert compared(group.roll_outs[1], geometry.compare)["distance/rms"] == pytest.approx(1.0)
+    assert (value, uncertainty) == pytest.approx((10.0, 4.0 / 2.0**0.5))  # a smaller step is no noise
+    assert dict(moved) == pytest.approx({TWIN: 4.0, SMALLER: -2.0})
+    # A member is compared with the others, not with itself.
+    value, uncertainty, moved = compared(group.roll_outs[1], geometry.compare)["distance/rms"]
+    assert (
+        value == pytest.approx(4.0)
+        and np.isnan(uncertainty)
+        and dict(moved) == pytest.approx({SMALLER: 2.0})
+    )
     assert compared(group.roll_outs[0], geometry.compare) == {}
     alone = grouped(scene, {"simulation": x, "newton-1": x + 0.01 * EAST})
     assert compared(alone.roll_outs[1], geometry.compare)["distance/rms"] == pytest.approx(10.0)
+
+
+def test_the_family_has_two_starts_of_each_time_step():
+    steps = {name: find_method(name).options.get("substeps", 1) for name in ("simulation", *FAMILY)}
+    shifts = {name: find_method(name).options.get("shift", 0.0) for name in steps}
+    assert sorted((steps[n], shifts[n]) for n in steps) == [
+        (s, x) for s in (1, 2, 4, 8) for x in (0.0, 1e-4)
+    ]
+    assert all(steps[one] == steps[two] == count for count, (one, two) in STARTS.items())
+    assert noise({TWIN: 3.0}) == pytest.approx(3.0 / 2.0**0.5) and noise({SMALLER: 3.0}) is None
+    assert trend({TWIN: 3.0, SMALLER: 1.0}) == {SMALLER: 1.0}
 
 
 def test_a_start_is_moved_by_its_shift_and_in_no_two_runs_alike():
@@ -57,7 +74,7 @@ def test_a_start_is_moved_by_its_shift_and_in_no_two_runs_alike():
     assert np.abs(starts[0] - starts[1]).max() > 0.1
 
 
-def test_numbers_of_the_reference_are_as_uncertain_as_its_ensemble_spreads():
+def test_numbers_of_the_reference_are_as_uncertain_as_its_starts_differ():
     def row(method, metric, value, uncertainty=None):
         entry = find_method(method)
         more = {"role": entry.role, "family": entry.reporting.family, "level": entry.reporting.level}
@@ -66,16 +83,13 @@ def test_numbers_of_the_reference_are_as_uncertain_as_its_ensemble_spreads():
     rows = [
         row("simulation", "energy/total", 1.0), row("simulation", "cost/frame", 5.0),
         row("simulation", "gap/energy", 0.1, 0.02), row("snug", "energy/total", 2.0),
-        row(TWINS[0], "energy/total", 1.01), row(TWINS[1], "energy/total", 0.97),
-        row(TWINS[0], "cost/frame", 9.0), row(TWINS[0], "gap/energy", 0.3),
-        row("simulation-dt/8", "energy/total", 7.0),
+        row(TWIN, "energy/total", 0.97), row(TWIN, "cost/frame", 9.0), row(TWIN, "gap/energy", 0.3),
+        row(SMALLER, "energy/total", 7.0), row("simulation-1e-8", "energy/total", 5.0),
     ]  # fmt: skip
     uncertain_rows = with_uncertainty(rows)
     spreads = {(r.method, r.metric): r.uncertainty for r in uncertain_rows}
-    assert spreads["simulation", "energy/total"] == pytest.approx(
-        (0.0013 / 3) ** 0.5
-    )  # of 0, 0.01, -0.03
-    assert dict(uncertain_rows[0].moved) == pytest.approx({TWINS[0]: 0.01, TWINS[1]: -0.03})
+    assert spreads["simulation", "energy/total"] == pytest.approx(0.03 / 2.0**0.5)
+    assert dict(uncertain_rows[0].moved) == pytest.approx({TWIN: -0.03, SMALLER: 6.0})
     assert not any(r.moved for r in uncertain_rows[1:])
     assert spreads["simulation", "cost/frame"] is None and spreads["snug", "energy/total"] is None
     assert spreads["simulation", "gap/energy"] == 0.02

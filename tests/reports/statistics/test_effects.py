@@ -15,12 +15,14 @@ from reports.statistics.effects import (
     EXCESS,
     RANGE,
     RATIO,
+    Effect,
     cost_effect,
     effect,
     off_scale,
     on_scale,
 )
 from reports.statistics.means_and_spreads import Mean, mean_of, pair
+from reports.statistics.verdicts import standing, why_open
 from tests.reports.report_folder import row, run_of
 
 
@@ -247,11 +249,11 @@ def test_a_cost_has_the_range_of_what_was_measured_and_no_interval():
     assert (alone.covers, alone.interval, alone.shown) == (RANGE, None, 0.5)
 
 
-TWINS = ("simulation-refrozen", "simulation-perturbed-1e-4")
+TWINS = ("simulation-perturbed-1e-4", "simulation-dt/4", "simulation-dt/4-perturbed-1e-4")
 
 
 def moved_means(changes):
-    """Two means over the same motions: method -> change of each motion by each member of the ensemble."""
+    """Two means over the same motions: method -> change of each motion by each member of the family."""
     rows = [
         replace(row(f"tshirt/{scene}", method, value=value), moved=tuple(zip(TWINS, moved)))
         for method, value in (("snug", 1.0), ("pbns", 1.3))
@@ -261,7 +263,7 @@ def moved_means(changes):
 
 
 def replace_moved(means, member, change):
-    """The means with a change by a further member of the ensemble in the first motion alone."""
+    """The means with a change by a further member of the family in the first motion alone."""
     return [
         replace(mean, moved=mean.moved | {first: {**mean.moved[first], member: change}})
         for mean in means
@@ -269,24 +271,34 @@ def replace_moved(means, member, change):
     ]
 
 
-def test_the_uncertainty_is_the_standard_deviation_of_the_effect_over_the_ensemble():
+def test_two_starts_make_the_noise_and_smaller_steps_a_trend_that_may_turn_the_sign():
     """Each member takes the reference's place in all motions at once."""
-    none = ((0.0, 0.0), (0.0, 0.0))
-    snug = ((0.2, -0.1), (0.4, 0.3))
+    none = ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    snug = ((0.2, 1.0, 1.3), (0.4, 1.4, 1.5))
     comparison = effect(*moved_means({"snug": snug, "pbns": none}), DIFFERENCE)
-    assert comparison.uncertainty == pytest.approx(np.std([0.0, 0.3, 0.1], ddof=1))
+    assert comparison.uncertainty == pytest.approx(math.sqrt((0.3**2 + 0.2**2) / 4.0))
+    assert comparison.against == pytest.approx({TWINS[1]: 1.2, TWINS[2]: 1.4})
+    assert comparison.value == pytest.approx(-0.3) and comparison.turned_by() == list(TWINS[1:])
     # What a member does to both methods moves them not apart, on the scale of the test.
     both = effect(*moved_means({"snug": snug, "pbns": snug}), DIFFERENCE)
-    assert both.uncertainty == pytest.approx(0.0)
+    assert both.uncertainty == pytest.approx(0.0) and both.turned_by() == []
     logs = [np.log(1.0 + np.array(moves)).mean() for moves in zip(*snug)]
     assert effect(*moved_means({"snug": snug, "pbns": none})).uncertainty == pytest.approx(
-        np.std([0.0, *logs], ddof=1)
+        math.sqrt((logs[0] ** 2 + (logs[1] - logs[2]) ** 2) / 4.0)
     )
     # A member that is missing in one motion did not leave that motion as it was: it takes no part.
-    third = replace_moved(moved_means({"snug": snug, "pbns": none}), "simulation-1e-8", 5.0)
-    assert effect(*third, DIFFERENCE).uncertainty == comparison.uncertainty
-    # Of one member nobody knows the spread.
-    assert effect(*moved_means({"snug": ((0.2,), (0.4,)), "pbns": ((), ())})).uncertainty == 0.0
+    third = replace_moved(moved_means({"snug": snug, "pbns": none}), "simulation-dt/8", -5.0)
+    assert effect(*third, DIFFERENCE).against == comparison.against
+    # Smaller steps alone have no noise.
+    trend = effect(*moved_means({"snug": ((0.0,), (0.0,)), "pbns": ((), ())}), DIFFERENCE)
+    assert trend.uncertainty == 0.0
+
+
+@pytest.mark.parametrize(("change", "expected"), [(0.3, "less"), (0.7, "inconclusive")])
+def test_a_verdict_stands_where_every_time_step_has_its_sign(change, expected):
+    far = Effect(-0.5, RATIO, error=0.1, freedom=10.0, motions=20, against={"simulation-dt/8": change})
+    assert standing(far, 0.001) == expected
+    assert why_open(far) == (": other sign against simulation-dt/8" if expected == "inconclusive" else "")
 
 
 def test_uncertainties_of_two_runs_add_up_as_independent_ones():
