@@ -106,7 +106,10 @@ STRICTER = "; tested more strictly: "  # before a condition that the paper's wor
 CLOSE = (
     f"Figure 7: close to offline simulation on unseen motion{STRICTER}no more energy than simulated cloth"
 )
-OTHERS = "Figure 7: at least on par with other data-driven methods; here with more steps, and on augmented motions"
+OTHERS = (
+    "Figure 7: at least on par with other data-driven methods; here with more steps, and on augmented "
+    "motions"
+)
 SPRINGS = "Figure 3: springs deform less expressively than StVK; here, networks trained on either"
 MATERIAL = "Figure 3, with all of PBNS's material, springs and unscaled hinges"
 SIMULATED = {
