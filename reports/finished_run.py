@@ -13,7 +13,7 @@ import pandas as pd
 
 from benchmarks.metric import Metric
 from benchmarks.results import run_folder
-from benchmarks.results.protocol import FAMILY, one_protocol
+from benchmarks.results.protocol import FAMILY, SECOND_STARTS, one_protocol
 from benchmarks.results.row import COLUMNS, OPTIONAL_NUMBERS, ROLES, USABLE, ResultsError, Row
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.files.array_file import read_arrays
@@ -177,6 +177,11 @@ class Run:
     def reference_family(self) -> list[str]:
         """Members of the reference's family, which take its place in turn."""
         return [name for name in self.methods if name in FAMILY]
+
+    @property
+    def twins(self) -> set[str]:
+        """Simulations as valid as the reference, which only show its noise: no rows of tables and figures."""
+        return {*SECOND_STARTS, "simulation-refrozen", "simulation-1e-8"} & self.methods.keys()
 
     def label(self, method: str) -> str:
         """Return the method's name for people."""

@@ -17,7 +17,6 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from benchmarks.results.protocol import SECOND_STARTS
 from reference_sim.files.atomic_files import replacing
 from reports.finished_run import ReportedMethod, Run
 
@@ -114,7 +113,7 @@ def leading(run: Run, methods: Iterable[str]) -> list[str]:
 
     Perturbed references, which only show the reference's uncertainty, are left out.
     """
-    ordered = run.ordered(set(methods) - set(SECOND_STARTS))
+    ordered = run.ordered(set(methods) - run.twins)
     return ordered if len(ordered) <= ROOM else [m for m in ordered if run.methods[m].role in LEADING]
 
 

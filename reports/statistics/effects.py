@@ -81,7 +81,7 @@ class Effect:
     possible: tuple[float, float] = (-math.inf, math.inf)
     least_p: float = 0.0
     uncertainty: float = 0.0
-    against: Mapping[str, float] = field(default_factory=dict)
+    against: Mapping[str, float] = field(default_factory=dict, hash=False)
     unit: float = 0.0
     complete: bool = True
     one_seed: bool = False

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 import pandas as pd
 
 from benchmarks.metric import Metric
-from benchmarks.results.protocol import SECOND_STARTS
 from reports.finished_run import Run
 from reports.statistics.means_and_spreads import mean_of, means
 from reports.statistics.relative_excess import (
@@ -40,7 +39,7 @@ def _by_garment(run: Run, name: str) -> list[Table]:
     which = "timed" if name == "cost" else "the"
     metrics, lines = pivot(run, run.garment_rows, name, ("garment", "method"))
     apart = {
-        garment: run.standing_apart(rows) | set(SECOND_STARTS)
+        garment: run.standing_apart(rows) | run.twins
         for garment, rows in run.garment_rows[run.garment_rows["table"] == name].groupby("garment")
     }
     return table(
@@ -159,7 +158,7 @@ def shapes(run: Run) -> list[Table]:
     metrics = [run.metrics[name] for name in METRICS if name in run.metrics]
     if norms.nunique() < 2 or not metrics:
         return []
-    methods = run.ordered(set(rows["method"]) - set(SECOND_STARTS))
+    methods = run.ordered(set(rows["method"]) - run.twins)
     lines: list[tuple[Cell, ...]] = []
     for name, scenes in ((OTHERS, norms.index[norms > 0.0]), (MEAN_BODY, norms.index[norms == 0.0])):
         part = rows[rows["scene"].isin(scenes)]

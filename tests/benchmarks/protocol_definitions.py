@@ -16,7 +16,7 @@ import numpy as np
 
 from benchmarks.presets import PRESETS, find_preset
 from benchmarks.results import protocol as recorded
-from benchmarks.results.protocol import LEAST_MEMBERS, MEMBERS
+from benchmarks.results.protocol import STARTS
 from benchmarks.scenes import GARMENT_SCENES, SCENES, all_scenes
 from reference_sim.minimise.newton import Newton
 
@@ -138,7 +138,7 @@ def _reference() -> dict[str, Any]:
     from snug.recipe import DEFAULT
 
     return {
-        "ensemble": MEMBERS, "least": LEAST_MEMBERS, "tolerance": Newton.__init__.__kwdefaults__["tolerance"],
+        "family": STARTS, "tolerance": Newton.__init__.__kwdefaults__["tolerance"],
         "quasi-static": (AT_REST["dt"], AT_REST["tolerance"]), "skinning": DEFAULT.smoothing,
     }  # fmt: skip
 
