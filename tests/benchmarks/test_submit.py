@@ -136,6 +136,8 @@ def full_size(monkeypatch):
 @pytest.mark.parametrize("path", FOLDERS, ids=lambda path: path.name)
 def test_every_entry_here_is_as_it_was_scored(full_size, path):
     assert RunFolder(path / "scores").config_path.is_file()
+    if f'protocol = "{NUMBER}"' not in (path / "entry.toml").read_text():
+        pytest.skip("scored by an earlier protocol: made again with the published runs")
     assert main(["check", str(path)]) == 0
 
 
