@@ -26,9 +26,8 @@ from typing import TYPE_CHECKING, TypeVar
 if TYPE_CHECKING:
     import numpy as np
 
-AFTER = (
-    0.05  # [s] for which the process is watched once the clock has stopped, and again where it is at work
-)
+# [s] for which the process is watched once the clock has stopped, and again where it is at work
+AFTER = 0.05
 WATCHES = 3  # times in a row; a machine that is busy elsewhere lends its time to one of them, not to all
 BUSY = 0.3  # share of AFTER which the processor may be at work
 CROWDED = 1.3  # processor seconds per second on the clock, beyond which more than one thread has worked

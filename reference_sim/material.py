@@ -61,12 +61,8 @@ class Material:
             return make(**values)
         except FileNotFoundError:
             raise ValueError(f"{path}: no such file") from None
-        except (
-            ValueError,
-            TypeError,
-            OverflowError,
-            RecursionError,
-        ) as error:  # also of text that is none
+        except (ValueError, TypeError, OverflowError, RecursionError) as error:
+            # also of text that is none
             reason = " ".join(str(error).split())
             raise ValueError(f"{path}: {reason}; give fields of Material in SI units") from None
 

@@ -37,9 +37,8 @@ ENERGY_TOLERANCE = 0.02  # share of an energy
 TOLERANCE = 0.05  # share of any other answer
 TIME_TOLERANCE = 0.15  # share of a time or memory that was repeated
 ONCE = 2.0  # factor of a time that was taken once: below it another load of the machine may be the cause
-FLOOR = (
-    1e-4  # share of the median method's value; a smaller difference is none, whatever it is a share of
-)
+# share of the median method's value; a smaller difference is none, whatever it is a share of
+FLOOR = 1e-4
 SPREADS = 3.0  # times the reference's noise, beyond which an answer that nothing repeats has changed
 
 

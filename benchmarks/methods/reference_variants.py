@@ -29,8 +29,7 @@ def of_own_energies(scene: BuiltScene, recipe: Recipe) -> BuiltScene:
     contact = (make_contact(scene.cloth, recipe),) * (scene.obstacle is not None)
     own = *static_terms(scene.cloth, recipe).values(), *contact
     further = scene.minimised[len(scene.energies) :]
-    start = scene.start_state
-    return replace(scene, energies=own, minimised=own + further, settle=lambda: start)
+    return replace(scene, energies=own, minimised=own + further, settle=lambda: scene.start_state)
 
 
 def of_perturbed_start(scene: BuiltScene, shift: float) -> BuiltScene:

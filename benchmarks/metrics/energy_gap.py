@@ -39,9 +39,8 @@ if TYPE_CHECKING:
     from benchmarks.scene import BuiltScene
     from reference_sim.potential import Potential
 
-ITERATIONS = (
-    300  # of one minimisation: a limit by the clock would make a gap depend on how busy a machine is
-)
+# of one minimisation: a limit by the clock would make a gap depend on how busy a machine is
+ITERATIONS = 300
 PRECISION = 0.1  # standard error of the gap, as a share of it
 NEGLIGIBLE = 1e-6  # of the scale: a standard error below it is small enough however small the gap is
 MM = 1e3

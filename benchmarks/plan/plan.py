@@ -184,9 +184,8 @@ def _is_declared(scene: Scene, preset: str) -> bool:
     )
 
 
-WORKERS = (
-    2  # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
-)
+# the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
+WORKERS = 2
 
 
 def make_plan(
@@ -286,9 +285,8 @@ def check_machines(study: Study, folder: Path, scheduler: str) -> None:
     trained = study.trained
     if trained and not trained.is_dir():
         raise StudyError(f"trained: {trained}: no such folder; without DIR the package's are taken")
-    if (
-        trained and trained.resolve() == folder.resolve()
-    ):  # where networks of another training are removed
+    # where networks of another training are removed
+    if trained and trained.resolve() == folder.resolve():
         raise StudyError(f"trained: {trained}: the folder of this run itself: give another by --out")
     for name, given in (("rollouts", study.rollouts), ("trained", trained), ("device", study.device)):
         if scheduler and given and given != "cpu":

@@ -32,9 +32,8 @@ if TYPE_CHECKING:
     from benchmarks.assets import Assets
 
 PATIENCE = 2.0  # [s] for an idle process to clean up behind itself: semaphores, as of progress bars
-COMPILING = (
-    900.0  # [s] for what a process does before its first task: it may have to compile every kernel
-)
+# [s] for what a process does before its first task: it may have to compile every kernel
+COMPILING = 900.0
 # What every process loads. Nothing that a scene may do without: not torch, not what a body is asked with.
 LOADED_BY_ALL = ("h5py", "numba", "scipy.sparse.linalg", "reference_sim", "benchmarks.runner.cells")
 # What every task of a scene with a body loads: torch skins the garment.
@@ -78,9 +77,8 @@ class TaskProcess:
                 outcome = self._call(perform, task.batch_id, task.run, needed, seconds=task.deadline)
         except Exception as error:
             outcome = failure(error)
-        if (
-            outcome.status == "timeout"
-        ):  # of a program, ended by its method: what it has started may run on
+        # of a program, ended by its method: what it has started may run on
+        if outcome.status == "timeout":
             self.close()
         return outcome if outcome.seconds else replace(outcome, seconds=time.perf_counter() - clock)
 

@@ -133,11 +133,8 @@ class Runner:
         """Write the outcome into the cache; one that cannot be written is a failure."""
         try:
             kept = self.cache.keep(task, outcome, self.outcomes)
-        except (
-            TypeError,
-            ValueError,
-            OSError,
-        ) as error:  # a result that is no plain value, a file not there
+        except (TypeError, ValueError, OSError) as error:
+            # a result that is no plain value, a file not there
             kept = self.cache.keep(task, failure(error), self.outcomes)
         self.outcomes[task.id] = kept
 

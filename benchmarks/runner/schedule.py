@@ -79,9 +79,8 @@ def users_code(*homes: str) -> tuple[str, ...]:
 
 
 TRAINED = "training"  # the stage of networks that no file has
-AT_ONCE = (
-    8  # cells of one scene whose processes wait for their repeats: each holds some hundred megabytes
-)
+# cells of one scene whose processes wait for their repeats: each holds some hundred megabytes
+AT_ONCE = 8
 
 
 def tasks_of(plan: Plan) -> list[Task]:

@@ -124,7 +124,7 @@ class Task:
 
     @property
     def batch_id(self) -> TaskId:
-        """What its batch is known by: its process has one memo for all of them."""
+        """Id of the batch of tasks that it belongs to: they share a process, and its memo."""
         return self.kind if not self.process else "", self.process or self.batch or self.name
 
     @property

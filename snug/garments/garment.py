@@ -169,12 +169,10 @@ def enclosed_limbs(body: Body, positions: Array, faces: Index) -> tuple[str, ...
 
 
 ARMHOLE = 0.2  # share of the upper arm, beyond which an opening is a sleeve
-OPEN_SEAM = (
-    0.05  # of the mean boundary edge: between boundary vertices that no edge joins, a seam left open
-)
-MIDDLE = (
-    0.5  # share of a hip joint's distance from the middle, beyond which an opening is a sleeve or a leg
-)
+# of the mean boundary edge: between boundary vertices that no edge joins, a seam left open
+OPEN_SEAM = 0.05
+# share of a hip joint's distance from the middle, beyond which an opening is a sleeve or a leg
+MIDDLE = 0.5
 ORDER = ("neck", "waist", "left_sleeve", "right_sleeve", "left_armhole", "right_armhole", "left_leg",
          "right_leg", "hem")  # fmt: skip
 

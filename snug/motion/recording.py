@@ -113,9 +113,8 @@ def check_recording(motion: Motion) -> None:
 
 # From the axes of a file, by the one that is vertical, to ours: with z up (x, y, z) becomes (x, z, -y).
 TO_Y_UP = {"y": np.eye(3), "z": np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])}
-MAX_LYING_COSINE = (
-    0.3  # between the vertical and the way from ankles to head: below it a body lies or crawls
-)
+# between the vertical and the way from ankles to head: below it a body lies or crawls
+MAX_LYING_COSINE = 0.3
 MAX_RISE = 1.0  # [m] the lowest joint may rise and fall where no axis is given: more than a jump
 
 

@@ -79,9 +79,8 @@ STATIC_WIDTHS = (64, 128, 256, 512)
 JOINT_WIDTHS = (32, 32)  # of layers that all joints share
 WIDTH = 512  # of the codes, of the other layers of the dynamic branch, and of the decoder
 DECODER_LAYERS = 3
-LEAD = (
-    13  # frames: with a window of three the recurrent units see 16, half a second of rates at 30 a second
-)
+# frames: with a window of three the recurrent units see 16, half a second of rates at 30 a second
+LEAD = 13
 EXCHANGED = 0.2  # share of a batch
 JUDGED_BY_INERTIA = 2  # first frame of a window that has inertia
 

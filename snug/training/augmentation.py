@@ -44,9 +44,8 @@ ARM_DEGREES = (25.0, 50.0)
 # Degrees between thigh and spine: a hip bends by about 120 and no further. At 40, as a squat under the
 # spine of a bow has it, thighs enter the belly, and no hem between them is free.
 HIP_DEGREES = 60.0
-LIFT_DEGREES = (
-    90.0  # degrees, at most: a lifted thigh comes up and goes down again by a random part of it
-)
+# degrees, at most: a lifted thigh comes up and goes down again by a random part of it
+LIFT_DEGREES = 90.0
 # Turn of each joint, relative to the recipe's; the collar bone turns little, the shoulder most.
 TURN_SHARES = {
     "pelvis": 1.0, "spine1": 1.0, "spine2": 1.0, "spine3": 1.0, "left_hip": 1.2, "right_hip": 1.2,

@@ -44,9 +44,8 @@ if TYPE_CHECKING:
 Trajectories = Mapping[str, np.ndarray]  # motion name -> simulated world vertices (T, V, 3) [m]
 
 DATA_SET_FORMAT = 2
-MICROMETRES = (
-    6  # decimals of positions [m] that count: another processor may tailor the last bits otherwise
-)
+# decimals of positions [m] that count: another processor may tailor the last bits otherwise
+MICROMETRES = 6
 
 
 class DataSetError(ValueError):

@@ -37,9 +37,8 @@ def test_definitions_train_as_the_kernels_do(kind, recipe, monkeypatch):
     monkeypatch.setattr(contact_planes, "REFRESH", 0.0)
     recipe = replace(recipe, window_stride=3 if kind == "snug" else 1)
     fast, slow = (make_trainer(recipe, kind, motions=[swaying(144)], kernels=k) for k in (True, False))
-    if (
-        fast.contact and slow.contact
-    ):  # the torch search finds the closest face where the walk may be rough
+    # the torch search finds the closest face where the walk may be rough
+    if fast.contact and slow.contact:
         tensors, facts = fast.contact.state()
         changed = torch.arange(fast.data.frames)
         anchors = fast.contact.cache
