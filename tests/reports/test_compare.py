@@ -2,71 +2,136 @@
 
 from __future__ import annotations
 
-import dataclasses
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from benchmarks.results.row import ResultsError
+from benchmarks.results.row import ResultsError, Row
 from reports import compare as command
-from reports.comparison import compare
+from reports.comparison import FAILING, compare
 from tests.reports.report_folder import row, run_folder, run_of
 
-SCENES = ("tshirt/walk", "tshirt/jump", "tshirt/bow", "tshirt/kick")
+SCENES = tuple(f"tshirt/motion_{k}" for k in range(8))
 SEEDS = (0, 1, 2)
+METRICS = {"energy/strain": 0.04, "curvature/error": 6.0, "penetration/vertices": 0.3}
 
 
-def rows_of(draw: int = 0, **factors: float):
-    """A network whose seeds scatter by 3 %, a simulation, a solver with a time, a check."""
-    scatter = np.random.default_rng(draw).normal(1.0, 0.03, (len(SCENES), len(SEEDS)))
-    factor = {"snug": 1.0, "lbfgs-5": 1.0, "time": 1.0, **factors}
+def a_run(draw: int = 0) -> list[Row]:
+    """A network whose seeds scatter by 5 % alike in all motions and 10 % in each, a simulation, a solver."""
+    random = np.random.default_rng(draw)
     rows = []
-    for i, scene in enumerate(SCENES):
-        rows.append(row(scene, "simulation", "energy/strain", 1.0 + i))
-        rows.append(
-            row(scene, "lbfgs-5", "energy/strain", factor["lbfgs-5"] * (1.3 + i), uncertainty=0.01)
-        )
-        rows.append(row(scene, "lbfgs-5", "curvature/mean", 5.0 + i, unit="1/m"))
-        rows += [
-            row(scene, "snug", "energy/strain", factor["snug"] * (2.0 + i) * scatter[i, seed], seed=seed)
-            for seed in SEEDS
-        ]
-    timed = {"suite": "speed", "method": "lbfgs-5"}
-    rows.append(row("flag", metric="cost/frame", unit="ms", value=10.0 * factor["time"], **timed))
-    rows.append(row("flag", metric="cost/spread", unit="%", value=4.0, **timed))
-    rows.append(
-        row("flag", metric="cost/frame_worst", unit="ms", value=20.0 * factor["time"] ** 3, **timed)
-    )
-    check = {"suite": "validation", "method": "simulation", "metric": "check", "unit": "m"}
-    return [*rows, row("sag", value=0.28, expected=0.28, tolerance=1e-3, **check)]
-
-
-def found(one, other, **options):
-    return [
-        (c.verdict, c.place, c.method, c.metric)
-        for c in compare(run_of(one), run_of(other), **options).changes
+    for metric, size in METRICS.items():
+        alike = random.normal(0.0, 0.05, len(SEEDS))
+        for k, scene in enumerate(SCENES):
+            level = size * (1.0 + 0.3 * k)
+            values = level * np.exp(alike + random.normal(0.0, 0.1, len(SEEDS)))
+            rows += [row(scene, "snug", metric, float(values[s]), seed=s) for s in SEEDS]
+            rows.append(row(scene, "simulation", metric, 0.5 * level, uncertainty=0.005 * level))
+    for scene in SCENES:
+        for method, time in (("simulation", 60.0), ("skinning", 0.2)):
+            value = time * float(np.exp(random.normal(0.0, 0.05)))
+            rows.append(row(scene, method, "cost/frame", value, unit="ms"))
+    for method, time in (("simulation", 60.0), ("lbfgs-5", 6.0)):
+        rows.append(row("flag", method, "cost/frame", time, suite="speed", unit="ms"))
+        rows.append(row("flag", method, "cost/spread", 3.0, suite="speed", unit="%"))
+    # Of a scene without skinning, whose total is next to nothing.
+    rows += [
+        row("fall", method, "energy/total", 5e-8, suite="speed") for method in ("simulation", "lbfgs-5")
     ]
+    check = {"suite": "validation", "unit": "m", "expected": 0.28, "tolerance": 1e-3}
+    return [*rows, row("sag", "simulation", "check", 0.28, **check)]
 
 
-def test_a_network_that_is_better_beyond_its_seeds_is_found():
-    assert found(rows_of(), rows_of(1, snug=0.7)) == [("better", "tshirt", "snug", "energy/strain")]
+def times(factor: float, **where: object) -> Callable[[Row], Row]:
+    def change(given: Row) -> Row:
+        fits = all(getattr(given, name) == value for name, value in where.items())
+        return replace(given, value=factor * given.value) if fits else given
+
+    return change
+
+
+STRAIN = {"method": "snug", "metric": "energy/strain"}
+SIMULATED = {"method": "simulation", "metric": "energy/strain"}
+TIME = {"method": "lbfgs-5", "metric": "cost/frame"}
+PLANTED = {
+    "strain three times on one of eight motions": times(3.0, scene=SCENES[0], **STRAIN),
+    "strain ten times on one motion": times(10.0, scene=SCENES[5], **STRAIN),
+    "strain 1.3 times on all motions": times(1.3, **STRAIN),
+    "the simulation's strain 6 % more on one motion": times(1.06, scene=SCENES[3], **SIMULATED),
+    "simulation five times as slow, timed once": times(
+        5.0, method="simulation", metric="cost/frame", suite="garments"
+    ),
+    "skinning five times as slow, timed once": times(5.0, method="skinning", metric="cost/frame"),
+    "a solver 1.3 times as slow, repeated": times(1.3, **TIME),
+}
+LOST = {
+    "a method": lambda given: given.method != "skinning",
+    "a seed": lambda given: (given.method, given.seed) != ("snug", 2),
+    "a motion": lambda given: given.scene != SCENES[2],
+    "a metric of a method": lambda given: (given.method, given.metric) != ("snug", "curvature/error"),
+}
+
+
+def found(one: list[Row], other: list[Row], **options) -> list[tuple[str, str, str, str]]:
+    changes = compare(run_of(one), run_of(other), **options).changes
+    return [(change.verdict, change.place, change.method, change.metric) for change in changes]
+
+
+def fails(before: list[Row], after: list[Row]) -> bool:
+    return any(verdict in (*FAILING, "changed") for verdict, *_ in found(before, after))
+
+
+@pytest.mark.parametrize("name", PLANTED)
+def test_a_planted_regression_is_caught(name):
+    assert fails(a_run(0), [PLANTED[name](given) for given in a_run(1)])
+
+
+@pytest.mark.parametrize("name", LOST)
+def test_what_is_gone_is_caught_and_named_once(name):
+    after = [given for given in a_run(1) if LOST[name](given)]
+    lines = found(a_run(0), after)
+    assert lines and {verdict for verdict, *_ in lines} == {"gone"} and len(lines) <= 3
+    assert found(a_run(0), after, shared=True) == []
+
+
+def test_other_seeds_other_times_and_round_off_are_no_change():
+    alarms = sum(fails(a_run(2 * k), a_run(2 * k + 1)) for k in range(6))
+    assert alarms == 0
+    tiny = [times(1.0 - 1e-6, metric="energy/total")(given) for given in a_run(0)]
+    assert not fails(a_run(0), tiny)
+
+
+def test_a_motion_on_which_seeds_disagree_hides_no_change_of_another():
+    broken = {"scene": SCENES[6], "seed": 1} | STRAIN
+    before, after = ([times(40.0, **broken)(given) for given in a_run(draw)] for draw in (0, 1))
+    assert not fails(before, after)
+    assert fails(before, [times(3.0, scene=SCENES[0], **STRAIN)(given) for given in after])
 
 
 def test_what_the_uncertainty_or_2_percent_covers_is_no_change():
-    worse = rows_of(**{"lbfgs-5": 1.1})
-    assert found(rows_of(), worse) == [("worse", "tshirt", "lbfgs-5", "energy/strain")]
-    assert found(rows_of(), rows_of(**{"lbfgs-5": 1.015})) == []
-    unsure = [dataclasses.replace(r, uncertainty=0.5 * (r.method == "lbfgs-5")) for r in worse]
-    assert found(rows_of(), unsure) == []
+    little, worse = ([times(factor, **SIMULATED)(given) for given in a_run()] for factor in (1.015, 1.1))
+    assert found(a_run(), little) == []
+    assert found(a_run(), worse) == [("worse", "tshirt", "simulation", "energy/strain")]
+    assert found(a_run(), [replace(given, uncertainty=0.5) for given in worse]) == []
+
+
+@pytest.mark.parametrize(("spread", "factors"), [(3.0, (1.15, 1.25)), (12.0, (1.17, 1.5))])
+def test_a_repeated_time_is_compared_on_one_machine_with_the_range_of_its_repeats(spread, factors):
+    before = [replace(r, value=spread) if r.metric == "cost/spread" else r for r in a_run()]
+    same, slower = ([times(factor, **TIME)(given) for given in before] for factor in factors)
+    assert found(before, same) == []
+    assert found(before, slower) == [("worse", "flag", "lbfgs-5", "cost/frame")]
+    assert found(before, slower, times=False) == []
+    assert found(before, [replace(given, hardware="another") for given in slower]) == []
 
 
 def test_cells_of_two_protocols_are_refused():
     """A cell beside another reference is a user's own, though other rows of its run are of one protocol."""
-    own = [
-        dataclasses.replace(r, protocol="own" if r.scene == "tshirt/bow" else "1.0") for r in rows_of()
-    ]
-    frozen = [dataclasses.replace(r, protocol="1.0") for r in rows_of()]
-    with pytest.raises(ResultsError, match=r"tshirt/bow x simulation: of protocol 1\.0 in A, own in B"):
+    frozen = [replace(r, protocol="1.0") for r in a_run()]
+    own = [replace(r, protocol="own") if r.scene == SCENES[2] else r for r in frozen]
+    with pytest.raises(ResultsError, match=r"motion_2 x snug: of protocol 1\.0 in A, own in B"):
         compare(run_of(frozen), run_of(own))
 
 
@@ -76,29 +141,30 @@ def test_cells_of_two_protocols_are_refused():
         ({"preset": "quick"}, {"preset": "smoke"}, "preset quick in A"),
         ({"preset_values": {"frames": 20}}, {"preset_values": {"frames": 60}}, "frames 20 in A, 60 in B"),
         ({"body": ["a.npz", "1"]}, {"body": ["b.npz", "2"]}, r"body \['a.npz', '1'\] in A"),
-        ({"preset_values": {"steps": {"snug": 1}}}, {"preset_values": {"steps": {"snug": 2}}}, None),
-        ({"preset_values": {"frames": 20}}, {"preset_values": {"frames": 20, "new": 1}}, None),
     ],
 )
 def test_runs_of_other_scenes_are_refused_by_name(before, after, says):
-    one, other = run_of(rows_of(), **before), run_of(rows_of(), **after)
-    if says is None:
-        assert compare(one, other).changes == ()
-        return
     with pytest.raises(ResultsError, match=says):
-        compare(one, other)
+        compare(run_of(a_run(), **before), run_of(a_run(), **after))
+
+
+def test_steps_of_training_and_values_of_a_later_version_make_no_other_scenes():
+    one, other = ({"frames": 20, "steps": {"snug": 1}}, {"frames": 20, "steps": {"snug": 2}, "new": 1})
+    assert compare(run_of(a_run(), preset_values=one), run_of(a_run(), preset_values=other)).changes == ()
 
 
 def test_where_zero_is_a_choice_no_change_hangs_on_it():
     """All gravity energies are higher by 50 J, or by none: the same change is found in both."""
 
     def heights(more: float, zero: float):
-        rows = [row(s, "simulation", "energy/gravity", zero + 1.0 + i) for i, s in enumerate(SCENES)]
-        rows += [row(s, "skinning", "energy/gravity", zero + 2.0 + i) for i, s in enumerate(SCENES)]
-        rows += [dataclasses.replace(r, metric="energy/total") for r in rows]
-        return rows + [
-            row(s, "lbfgs-5", "energy/gravity", zero + 1.1 + i + more) for i, s in enumerate(SCENES)
+        rows = [
+            row(scene, method, f"energy/{term}", zero + height + i)
+            for i, scene in enumerate(SCENES)
+            for method, height in (("simulation", 1.0), ("skinning", 2.0))
+            for term in ("gravity", "total")
         ]
+        solved = [zero + 1.1 + more + i for i in range(len(SCENES))]
+        return rows + [row(s, "lbfgs-5", "energy/gravity", value) for s, value in zip(SCENES, solved)]
 
     # Patterns leave out simulation and skinning, or the total energy: the excess is of them all the same.
     moved = [("worse", "tshirt", "lbfgs-5", "relative_excess/gravity")]
@@ -111,41 +177,33 @@ def test_where_zero_is_a_choice_no_change_hangs_on_it():
     assert found(heights(0.0, 50.0), heights(0.015, 50.0)) == []  # 1.5 % of skinning's excess
 
 
-def test_repeated_times_count_beyond_15_percent_on_one_machine():
-    assert found(rows_of(), rows_of(time=1.15)) == []
-    assert found(rows_of(), rows_of(time=1.25)) == [("worse", "flag", "lbfgs-5", "cost/frame")]
-    assert found(rows_of(), rows_of(time=1.5), times=False) == []
-    elsewhere = [dataclasses.replace(r, hardware="another") for r in rows_of(time=1.5)]
-    assert found(rows_of(), elsewhere) == []
-
-
 def test_a_cell_that_fails_and_a_check_that_is_off_are_worse():
-    def ended(r):
+    def ended(r: Row) -> Row:
         if r.scene == "sag":
-            return dataclasses.replace(r, status="failed", value=0.5, reason="off")
+            return replace(r, status="failed", value=0.5, reason="off")
         lost = r.method == "snug" and r.scene == SCENES[0] and r.seed == 1
-        return dataclasses.replace(r, status="diverged", value=None, reason="step 7") if lost else r
+        return replace(r, status="diverged", value=None, reason="step 7") if lost else r
 
-    later = [ended(r) for r in rows_of()]
+    later = [ended(r) for r in a_run()]
     both = [("worse", SCENES[0], "snug", "energy/strain"), ("worse", "sag", "simulation", "check")]
-    assert found(rows_of(), later) == found(rows_of(), later, metrics="curvature/*") == both
-    assert [verdict for verdict, *_ in found(later, rows_of())] == ["better", "better"]
-    assert found(rows_of(), later, methods="lbfgs-*") == []
+    assert found(a_run(), later) == found(a_run(), later, metrics="penetration/*") == both
+    assert [verdict for verdict, *_ in found(later, a_run())] == ["better", "better"]
+    assert found(a_run(), later, methods="lbfgs-*") == []
 
 
 def test_exit_status_and_lines(tmp_path, capsys):
-    run_folder(tmp_path / "a", rows_of())
-    run_folder(tmp_path / "b", rows_of(1, snug=1.3))
+    run_folder(tmp_path / "a", a_run(0))
+    run_folder(tmp_path / "b", [times(1.3, **STRAIN)(given) for given in a_run(1)])
     one, worse = str(tmp_path / "a"), str(tmp_path / "b")
     assert command.main([one, one]) == 0 and "0 worse" in capsys.readouterr().out
     assert command.main([one, worse]) == 1
     line = capsys.readouterr().out.splitlines()[0]
-    assert line.startswith("worse   tshirt  snug  energy/strain  3.5")
-    assert " J, × 1.3" in line and "p " in line
+    assert line.startswith("worse   tshirt  snug  energy/strain  0.0")
+    assert " J, × 1." in line and "p " in line
     assert command.main([worse, one]) == 0
 
 
 @pytest.mark.parametrize("b, options", [("none", []), ("a", ["--metrics", "energy/strian"])])
 def test_bad_input_is_one_line_and_status_2(tmp_path, refused, b, options):
-    run_folder(tmp_path / "a", rows_of())
+    run_folder(tmp_path / "a", a_run())
     refused("reports.compare: ", command.main, [str(tmp_path / "a"), str(tmp_path / b), *options])

@@ -2,11 +2,46 @@
 
 from __future__ import annotations
 
+import base64
+import zlib
+
 import numpy as np
 import pytest
 
 from reports.page.embedded_roll_outs import Pack, depth, skin_of
-from tests.reports.page.page_by_hand import block, unpacked
+
+
+def block() -> tuple[np.ndarray, np.ndarray]:
+    """Corners (8,3) and faces (12,3) of the unit cube."""
+    corners = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
+    squares = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    return corners, np.array([half for a, b, c, d in squares for half in ((a, b, c), (a, c, d))])
+
+
+def unpacked(entries: dict, text: str) -> dict[str, np.ndarray]:
+    """The arrays of a pack, frame by frame as data.js has them."""
+    data, arrays = zlib.decompress(base64.b64decode(text)), {}
+    for name, entry in entries.items():
+        shape = tuple(entry["shape"])
+        size = int(np.prod(shape))
+        if entry["kind"] == "positions":
+            low, high = (
+                np.frombuffer(data, np.uint8, 2 * size, entry["at"]).reshape(2, *shape).astype(int)
+            )
+            left = low + 256 * high
+            left = np.where(left % 2, -(left + 1) // 2, left // 2)
+            steps = np.zeros((shape[0] + 2, *shape[1:]), dtype=int)
+            for k in range(shape[0]):
+                moved = steps[k + 1] - steps[k] if k > 1 else 0
+                steps[k + 2] = (steps[k + 1] + moved + left[k]) % 65536
+            arrays[name] = np.array(entry["low"]) + entry["step"] * steps[2:]
+        elif entry["kind"] == "values":
+            levels = np.frombuffer(data, np.uint8, size, entry["at"]).reshape(shape).cumsum(0) % 256
+            arrays[name] = entry["full"] * (levels / 255.0) ** 2
+        else:
+            kind = "<f4" if entry["kind"] == "numbers" else "<u4"
+            arrays[name] = np.frombuffer(data, kind, size, entry["at"]).reshape(shape)
+    return arrays
 
 
 @pytest.mark.parametrize(
