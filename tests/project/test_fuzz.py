@@ -37,9 +37,8 @@ from snug.motion.motion import MotionError
 from snug.networks.garment_network import make_network
 from snug.networks.trained_model import ModelFileError, TrainedModel
 from snug.recipe import DEFAULT
-from tests.snug.body.other_bodies import smpl_arrays
-from tests.snug.motion.cmu_clips import amc_frame, cmu_like
-from tests.snug.motion.motion_forms import bvh
+from tests.snug.body.test_smpl_files import smpl_arrays
+from tests.snug.motion.motion_forms import amc_frame, bvh, cmu_like
 from tests.snug.training.dressing import tailored
 
 NUMBERS = (

@@ -65,6 +65,12 @@ def edge_counts(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return halves, edges, counts
 
 
+def volume(vertices: np.ndarray, faces: np.ndarray) -> float:
+    """Of a closed mesh [m^3], positive where faces are wound outwards."""
+    a, b, c = (vertices[faces[:, k]] for k in range(3))
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
+
+
 def girth(points: np.ndarray, faces: np.ndarray, axis: int, level: float) -> float:
     """Length [m] of a mesh's cut with the plane where coordinate `axis` is `level`, triangle by triangle."""
     total = 0.0

@@ -1,4 +1,4 @@
-"""The sum of terms against dense sums made here, the sparse pattern with pins, and ablation."""
+"""The sparse patterns of a sum of terms, with pins, against dense sums made here; what is no sum."""
 
 from __future__ import annotations
 
@@ -82,19 +82,6 @@ def test_the_scalar_pattern_is_the_sum_of_scalar_stiffnesses():
     assert np.linalg.eigvalsh(expected)[0] > 0  # what a preconditioner must be
     assembled = pattern.symmetric(pattern.assemble(x)).toarray()
     assert np.abs(assembled - expected).max() < 1e-13 * np.abs(expected).max()
-
-
-def test_value_and_gradient_are_sums_and_terms_names_them():
-    _, energies, x = all_terms()
-    potential = Potential(energies)
-    parts = [Energy.value_and_gradient(energy, x) for energy in energies]
-    assert all(abs(value) > 0 for value, _ in parts)
-    assert potential.value(x) == pytest.approx(sum(value for value, _ in parts), rel=1e-12)
-    expected = sum(gradient for _, gradient in parts)
-    assert np.abs(potential.gradient(x) - expected).max() < 1e-11 * np.abs(expected).max()
-    names = ["strain", "spring", "bending", "gravity", "inertia", "collision", "area_barrier"]
-    assert list(potential.terms(x)) == names
-    assert list(potential.terms(x).values()) == pytest.approx([value for value, _ in parts], rel=1e-12)
 
 
 @pytest.mark.parametrize(

@@ -1,17 +1,19 @@
 """Every energy where nothing is symmetric: closed forms against automatic differentiation.
 
 The reference is the definition (`element_energy`, in torch) through the base class. An energy without a
-line in CASES is found by the last test.
+line in CASES is found by the last test. Hinges are folded by hand too, through half a turn.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 import pytest
 import torch
+from numba import vectorize
 
 from reference_sim import Cloth, Material, energies
 from reference_sim.energies import (
@@ -25,8 +27,8 @@ from reference_sim.energies import (
     StretchSpring,
     StretchStVK,
 )
-from reference_sim.kernels.lanes import BlockPlaces
-from tests.reference_sim.meshes import patch, random_rotation
+from reference_sim.kernels.lanes import BlockPlaces, arctan2
+from tests.reference_sim.meshes import grid, patch, random_rotation
 
 
 def blocks_of(energy: Energy, x: np.ndarray, convexity: float = 0.0) -> np.ndarray:
@@ -230,6 +232,91 @@ def test_contact_takes_planes_per_frame():
         value, gradient = energy.value_and_gradient(x[k])
         assert value > 1e-6 and np.abs(gradient).max() > 1e-3
         assert float(energies[k].sum()) == pytest.approx(value, rel=1e-12)
+
+
+def hinge_at(phi: float) -> np.ndarray:
+    """An edge along x, one wing in the plane z = 0, the other turned by phi about the edge."""
+    return np.array([(0, 0, 0), (1, 0, 0), (0.3, 1, 0), (0.6, -np.cos(phi), -np.sin(phi))])
+
+
+@pytest.mark.parametrize("phi", [2.9, np.pi - 1e-7, np.pi + 1e-7, 3.4])
+@pytest.mark.parametrize("rest", [3.0, -3.0, 0.0])
+def test_a_hinge_passes_through_half_a_turn(phi, rest):
+    """Across phi = pi atan2 jumps by a full turn; energy, torque and stiffness must not notice.
+
+    The energy takes the shorter way round to the rest angle, so only the point opposite to it is a kink.
+    """
+    # The edge has length 1 and each face half a square metre: scaled by 1/4, k is 2 J.
+    cloth = Cloth(hinge_at(0.0), np.array([(0, 1, 2), (1, 0, 3)]), Material(bending_stiffness=8.0))
+    energy, x = BendHinge(cloth, rest_angles=rest), hinge_at(phi)
+    way = (phi - rest + np.pi) % (2 * np.pi) - np.pi
+    value, gradient = energy.value_and_gradient(x)
+    assert value == pytest.approx(way**2, rel=1e-12)
+    turn = np.zeros((4, 3))
+    turn[3] = (0, np.sin(phi), -np.cos(phi))  # dx/dphi
+    assert np.vdot(gradient, turn) == pytest.approx(2 * way, rel=1e-12)  # k (theta - theta_0)
+    curve = np.zeros((4, 3))
+    curve[3] = (0, np.cos(phi), np.sin(phi))  # d2x/dphi2
+    second = turn.ravel() @ blocks_of(energy, x)[0] @ turn.ravel() + np.vdot(gradient, curve)
+    assert second == pytest.approx(2.0, rel=1e-12)  # k
+    assert close(gradient, Energy.value_and_gradient(energy, x)[1], 1e-10)
+    assert close(blocks_of(energy, x), Energy.hessian_blocks(energy, x), 1e-10)
+
+
+def test_the_arctangent_of_the_kernels_is_that_of_numpy():
+    """All around the circle, near its axes and diagonals, at any size."""
+    generator = np.random.default_rng(4)
+    angles = np.concatenate([generator.uniform(-np.pi, np.pi, 20_000), np.pi / 8 * np.arange(-7, 8)])
+    angles = np.concatenate(
+        [angles, angles[-15:] + 1e-9, angles[-15:] - 1e-9, 10.0 ** np.arange(-300, 0, 7)]
+    )
+    size = 10 ** generator.uniform(-100, 100, len(angles))
+    y, x = size * np.sin(angles), size * np.cos(angles)
+    y[-5:], x[-5:] = [0.0, -0.0, 0.0, 1.0, -1.0], [1.0, 1.0, -1.0, 0.0, 0.0]
+    arctangents = vectorize(lambda y, x: arctan2(y, x))(y, x)
+    expected = np.arctan2(y, x)
+    assert (np.abs(arctangents - expected) <= 2 * np.spacing(np.abs(expected))).all()
+
+
+SHEET = Cloth(*grid(3, 3, width=0.1, depth=0.1))
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda cloth: ContactPenalty(cloth, margin=float("nan")),
+        lambda cloth: ContactPenalty(cloth, per_sample_stiffness=float("inf")),
+        lambda cloth: ContactFriction(ContactPenalty(cloth), speed=0.0),
+        lambda cloth: AreaBarrier(cloth, threshold=float("nan")),
+        lambda cloth: Inertia(cloth, float("inf")),
+    ],
+)
+def test_numbers_that_would_push_or_do_nothing_are_refused(make):
+    with pytest.raises(ValueError, match=r"must be a finite number"):
+        make(SHEET)
+
+
+@pytest.mark.parametrize("parent", [StretchStVK, ContactPenalty])
+def test_another_definition_states_where_its_derivatives_come_from(parent):
+    bent = SHEET.rest_positions + 0.01 * np.sin(40 * SHEET.rest_positions[:, [1, 2, 0]])
+
+    def halved(self, u):
+        return 0.5 * parent.element_energy(self, u)
+
+    with pytest.raises(
+        TypeError, match=r"Half would inherit closed forms of another energy: write "
+    ) as told:
+        type("Half", (parent,), {"element_energy": halved})
+    lines = re.findall(r"(\w+) = Energy\.(\w+)", str(told.value))
+    Half = type(
+        "Half", (parent,), {"element_energy": halved, **{a: getattr(Energy, b) for a, b in lines}}
+    )
+    whole, half = parent(SHEET), Half(SHEET)
+    if parent is ContactPenalty:
+        whole.points = half.points = whole.sample_matrix @ bent + [0.0, 1e-3, 0.0]
+    value, gradient = half.value_and_gradient(bent)
+    assert value == pytest.approx(0.5 * whole.value_and_gradient(bent)[0]) and value > 0
+    np.testing.assert_allclose(gradient, 0.5 * whole.value_and_gradient(bent)[1], atol=1e-12)
 
 
 def test_every_term_has_its_line_above():

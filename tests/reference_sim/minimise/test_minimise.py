@@ -4,15 +4,55 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import torch
 from scipy.spatial.distance import pdist
 
-from reference_sim import GRAVITY, Cloth, Potential, minimise
+from reference_sim import GRAVITY, Cloth, Potential, Result, minimise
 from reference_sim.energies import BendHinge, Gravity, Inertia, StretchSpring, StretchStVK
-from reference_sim.minimise.minimisers import MINIMISERS
-from tests.reference_sim.meshes import random_rotation
-from tests.reference_sim.minimise.minima import FACES, SHEET, assert_minimum, gradient_by_torch, hanging
+from reference_sim.minimise import lbfgs
+from reference_sim.minimise.descent import LBFGSHistory
+from reference_sim.minimise.minimisers import MINIMISERS, make_minimiser
+from tests.reference_sim.meshes import grid, random_rotation
+from tests.reference_sim.test_potential import dense_sum
 
+TOLERANCE = 1e-6  # relative residual, the default that a result promises
+SHEET, FACES = grid(8, 8, width=0.5, depth=0.5)
 both = pytest.mark.parametrize("method", MINIMISERS)
+
+
+def hanging() -> tuple[Potential, np.ndarray]:
+    cloth = Cloth(SHEET, FACES, pins=[0, 8])
+    return Potential([StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)]), SHEET
+
+
+def gradient_by_torch(potential: Potential, x: np.ndarray) -> np.ndarray:
+    """(V, 3) [N] from the definitions alone."""
+    variable = torch.as_tensor(x).clone().requires_grad_(True)
+    sum(energy.energy(variable).sum() for energy in potential.energies).backward()
+    return variable.grad.numpy()
+
+
+def free_hessian(potential: Potential, x: np.ndarray) -> np.ndarray:
+    """Dense, over the free vertices, from the definitions alone."""
+    rows = np.repeat(potential.cloth.free, 3)
+    return dense_sum(potential.energies, x)[np.ix_(rows, rows)]
+
+
+def assert_minimum(potential: Potential, x0: np.ndarray, result: Result) -> None:
+    """Pins still, gradient small and no negative curvature, by another way than the minimiser's own."""
+    x, pins = result.positions, potential.cloth.pins
+    assert result.status == "converged", result.reason
+    assert (x[pins] == x0[pins]).all() and np.isfinite(x).all()
+    gradient = gradient_by_torch(potential, x)
+    gradient[pins] = 0
+    norm = np.abs(gradient).max() / (potential.cloth.masses.mean() * GRAVITY)
+    assert norm <= TOLERANCE
+    # The two gradients differ by round-off of forces of 1 N in vertices of 1e-3 N.
+    assert result.gradient_norm == pytest.approx(norm, abs=1e-9)
+    values = np.linalg.eigvalsh(free_hessian(potential, x))
+    assert values[0] > -1e-10 * values[-1]
+    assert result.energy == pytest.approx(potential.value(x), rel=1e-12, abs=1e-20)
+    assert sum(result.terms.values()) == pytest.approx(result.energy, rel=1e-9, abs=1e-20)
 
 
 @both
@@ -65,3 +105,45 @@ def test_a_factorisation_used_again_saves_others_and_ends_in_a_minimum(case):
     assert_minimum(potential, x0, again)
     # 16 or 18 of 20 where the sheet hangs: that much is round-off.
     assert again.factorisations <= 0.9 * fresh.factorisations and again.iterations > again.factorisations
+
+
+def test_without_a_preconditioner_newton_takes_over_at_once():
+    potential, x = hanging()
+    minimiser = make_minimiser(potential, "lbfgs")
+    minimiser.preconditioner.solver.factorise = lambda data: False
+    assert_minimum(potential, x, minimiser.minimise(x))
+
+
+def test_lbfgs_and_its_finish_share_iterations_and_clock(monkeypatch):
+    potential, x0 = hanging()
+    monkeypatch.setattr(lbfgs, "PATIENCE", 20)
+    result = minimise(potential, x0, "lbfgs", max_iterations=30)
+    assert (result.status, result.iterations) == ("max_iterations", 30)
+    ticks = iter(range(100_000))
+    monkeypatch.setattr("time.perf_counter", lambda: float(next(ticks)))  # a second for every look at it
+    monkeypatch.setattr(lbfgs, "PATIENCE", 10)
+    monkeypatch.setattr(lbfgs, "SWITCH", 1e-6)
+    cut = minimise(potential, x0, "lbfgs", timeout=13)
+    assert cut.status == "timeout" and cut.iterations > 10
+    assert next(ticks) < 20
+
+
+@pytest.mark.parametrize("memory", [0, 5, 20])
+def test_the_two_loop_recursion_is_the_update_of_a_dense_matrix(memory):
+    """H <- (I - rho s y^T) H (I - rho y s^T) + rho s s^T for the pairs remembered, oldest first."""
+    generator = np.random.default_rng(1)
+    first, history, pairs = generator.uniform(1, 2, 12), LBFGSHistory(memory), []
+    for k in range(9):
+        s = generator.normal(size=12)
+        y = s * generator.uniform(1, 5, 12) * (-1 if k == 6 else 1)  # a negative curvature is left out
+        history.add(s, y)
+        pairs += [] if k == 6 else [(s, y)]
+    assert len(history) == min(memory, 8)
+    H = np.diag(1 / first)
+    for s, y in pairs[-memory:] if memory else []:
+        V = np.eye(12) - np.outer(y, s) / (s @ y)
+        H = V.T @ H @ V + np.outer(s, s) / (s @ y)
+    g = generator.normal(size=12)
+    assert history.direction(g, lambda q: q / first) == pytest.approx(-H @ g, rel=1e-12, abs=1e-12)
+    history.clear()
+    assert history.direction(g, lambda q: q / first) == pytest.approx(-g / first, rel=1e-15)

@@ -8,8 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from snug.body.skeleton import JOINT_NAMES, BodyError
 from snug.body.skinning import joint_transforms, skin
-from tests.reference_sim.meshes import edge_counts
-from tests.snug.body.other_bodies import volume
+from tests.reference_sim.meshes import edge_counts, volume
 
 
 def joint(name: str) -> int:

@@ -3,14 +3,89 @@
 import dataclasses
 import pickle
 
+import igl
 import numpy as np
 import pytest
+import torch
 from scipy.sparse import csc_matrix
 from scipy.spatial.transform import Rotation
 
-from snug.body.skeleton import JOINT, BodyError
+from snug.body.parametric_body import Body
+from snug.body.skeleton import JOINT, PARENTS, BodyError
+from snug.body.skinning import add_pose_correctives, skin
 from snug.body.smpl_files import read_body
-from tests.snug.body.other_bodies import other_mesh, plain_arrays, smpl_arrays, volume, with_hands
+from tests.reference_sim.meshes import edge_counts, volume
+
+
+def other_mesh(body: Body, faces: int = 13776) -> Body:
+    """Edges collapsed to so many faces, SMPL's; weights and shapes from the closest points of the body."""
+    points, triangles, *_ = igl.decimate(body.template, body.faces.astype(np.int64), faces)
+    _, nearest, closest = igl.point_mesh_squared_distance(
+        points, body.template, body.faces.astype(np.int64)
+    )
+    corners = body.faces[nearest]
+    shares = igl.barycentric_coordinates(closest, *(body.template[corners[:, k]] for k in range(3)))
+    shares = np.clip(shares, 0.0, None)
+    shares /= shares.sum(axis=1, keepdims=True)
+
+    def carried(values: np.ndarray) -> np.ndarray:
+        return np.einsum("vk,vk...->v...", shares, values[corners])
+
+    return dataclasses.replace(
+        body,
+        template=points,
+        shape_directions=carried(body.shape_directions),
+        skinning_weights=carried(body.skinning_weights),
+        faces=triangles.astype(np.int64),
+    )
+
+
+def smpl_arrays(body: Body) -> dict[str, np.ndarray]:
+    """In SMPL's layout, with a regressor that gives the body's joints exactly."""
+    known = np.concatenate([body.template[..., None], body.shape_directions], axis=2)
+    joints = np.concatenate([body.joint_template[..., None], body.joint_directions], axis=2)
+    regressor = np.linalg.lstsq(
+        known.reshape(len(body.template), -1).T, joints.reshape(24, -1).T, rcond=None
+    )[0].T
+    table = np.stack([np.array(PARENTS), np.arange(24)]).astype(np.uint32)  # the root's -1 is 2^32 - 1
+    return {
+        "v_template": body.template,
+        "shapedirs": body.shape_directions,
+        "J_regressor": regressor,
+        "weights": body.skinning_weights,
+        "kintree_table": table,
+        "f": body.faces.astype(np.uint32),
+    }
+
+
+def with_hands(arrays: dict[str, np.ndarray], face: bool) -> dict[str, np.ndarray]:
+    """SMPL-H's layout, 52 joints, or with jaw and eyes SMPL-X's, 55: weights of hand and head are shared out.
+
+    Five fingers of three joints hang on each wrist; their knuckles' mean is SMPL's joint of the hand.
+    """
+    regressor, weights = arrays["J_regressor"], arrays["weights"]
+    parents = list(PARENTS[:22])
+    joints, shares = list(regressor[:22]), [*weights[:, :22].T]
+    if face:
+        head = shares[15] / 4
+        shares[15] = head
+        parents += [15, 15, 15]
+        joints += [regressor[15]] * 3
+        shares += [head] * 3
+    for wrist, hand in ((20, 22), (21, 23)):
+        for finger in range(5):
+            first = len(parents)
+            parents += [wrist, first, first + 1]
+            bone = 0.1 * (regressor[hand] - regressor[wrist])
+            joints += [regressor[hand] + (finger - 2 + k) * bone for k in range(3)]
+            shares += [weights[:, hand] / 15] * 3
+    table = np.stack([np.array(parents), np.arange(len(parents))]).astype(np.uint32)
+    return {
+        **arrays,
+        "J_regressor": np.stack(joints),
+        "weights": np.stack(shares, 1),
+        "kintree_table": table,
+    }
 
 
 @pytest.fixture(scope="module")
@@ -27,7 +102,13 @@ def layouts(small):
         "SMPL": smpl,
         "SMPL-H": with_hands(smpl, face=False),
         "SMPL-X": with_hands(smpl, face=True),
-        "plain": plain_arrays(small),
+        "plain": {
+            "vertices": small.template,
+            "faces": small.faces,
+            "blend_weights": small.skinning_weights,
+            "joints": small.joint_template,
+            "parents": small.parents,
+        },
     }
 
 
@@ -76,10 +157,6 @@ def test_pose_correctives_are_what_smpl_says(small, layouts, tmp_path):
 
 
 def test_training_poses_the_body_with_its_correctives(small, tmp_path):
-    import torch
-
-    from snug.body.skinning import add_pose_correctives, skin
-
     posedirs = 0.003 * np.random.default_rng(0).normal(size=(len(small.template), 3, 189))
     user = dataclasses.replace(small, pose_directions=posedirs)
     poses = np.random.default_rng(1).normal(scale=0.5, size=(2, 24, 3))
@@ -107,8 +184,7 @@ def test_the_eyes_of_a_head_are_closed(small, layouts, tmp_path):
     assert volume(user.template, user.faces) == pytest.approx(
         volume(small.template, small.faces), rel=0.01
     )
-    edges = np.sort(user.faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
-    assert np.all(np.unique(edges, axis=0, return_counts=True)[1] == 2)
+    assert np.all(edge_counts(user.faces)[2] == 2)
 
 
 def changed(key, change, layout="SMPL"):

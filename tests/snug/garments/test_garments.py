@@ -12,7 +12,7 @@ from snug.garments.cuts import neck_cut
 from snug.garments.garment import GarmentError
 from snug.garments.templates import GARMENT_TEMPLATES, find_template
 from tests.reference_sim.meshes import edge_counts, girth
-from tests.snug.body.other_bodies import child, other_mesh
+from tests.snug.body.test_smpl_files import other_mesh
 from tests.snug.training.dressing import tailored
 
 KINDS = [pattern.name for pattern in GARMENT_TEMPLATES]
@@ -201,6 +201,41 @@ def test_a_dress_follows_both_thighs_below_and_the_skin_above(body):
     )
     assert steps < 0.2 and borrowed > 0.5
     assert np.allclose(dress.skinning_weights.sum(axis=1), 1.0, atol=1e-12)
+
+
+def test_a_skirt_fits_waist_and_hips_and_has_two_even_rims(body):
+    skirt = tailored("skirt", 600)
+    points = skirt.rest_positions
+    assert np.array_equal(skirt.pins, np.sort(skirt.loops["waist"]))
+    distance = igl.signed_distance(points, body.template, body.faces)[0]
+    waist, hem = (points[skirt.loops[name]] for name in ("waist", "hem"))
+    hip, knee = (at(body, n)[1] for n in ("left_hip", "left_knee"))
+    assert (
+        np.ptp(waist[:, 1]) < 1e-4 and np.ptp(hem[:, 1]) < 1e-4 and knee < hem[0, 1] < hip < waist[0, 1]
+    )
+    assert distance[skirt.pins].max() < 0.012  # the band lies close
+    levels = np.linspace(hem[0, 1], waist[0, 1], 10)[1:-1]
+    girths = [girth(points, skirt.faces, 1, level) for level in levels]
+    assert np.diff(girths).max() < 0 and girths[0] > 1.6 * girths[-1]
+
+
+def test_between_the_thighs_a_skirt_follows_both():
+    """The jump from leg to leg that borrowed weights have is gone; at the sides it follows its own thigh."""
+    skirt = tailored("skirt", 600)
+    x, w = skirt.rest_positions[:, 0], skirt.skinning_weights
+    left, right = (w[:, JOINT[f"{side}_hip"]] for side in ("left", "right"))
+    hem = np.isin(np.arange(len(x)), skirt.hem)
+    middle, side = hem & (np.abs(x) < 0.02), hem & (x > 0.25)
+    assert np.abs(left - right)[middle].max() < 0.15 and (left - right)[side].min() > 0.3
+    assert np.allclose(w.sum(axis=1), 1.0, atol=1e-12) and w.min() >= 0
+
+
+def child(body):
+    """The body shrunk to 70 % of its size, a little shorter still."""
+    size = np.array([0.7, 0.63, 0.7])
+    return dataclasses.replace(
+        body, template=body.template * size, joint_template=body.joint_template * size
+    )
 
 
 CUTS = ("tank_top", "trousers")  # of each kind of cut one

@@ -8,8 +8,7 @@ from snug.body.skeleton import JOINT, LEG_LENGTH, global_rotations, joint_positi
 from snug.file_options import MotionFileOptions
 from snug.motion.acclaim import CMU_RATE, JOINT_BONES, read_amc, read_asf, read_asf_amc
 from snug.motion.retarget import LIMBS
-from tests.snug.motion.cmu_clips import amc_frame, write_clip
-from tests.snug.motion.motion_forms import read, refuse
+from tests.snug.motion.motion_forms import amc_frame, read, refuse, write_clip
 
 REFUSED = [
     (".amc", lambda text: text.replace("head 0.0", "head nan", 1), "line 6: 'nan' should be 1 finite"),

@@ -20,13 +20,11 @@ from snug.motion.motion import (
     MotionError,
     arm_clearance,
     clear_arms,
-    heading,
     nearest_pose,
     place,
     resample,
     spread_arms,
     transition,
-    turn_about_vertical,
 )
 from snug.motion.posture import poses_from_angles
 from tests.snug.motion.motion_forms import joint_speeds
@@ -180,17 +178,6 @@ def test_spread_arms_lifts_both_upper_arms_by_the_angle():
         np.testing.assert_allclose(lowered, 50.0, atol=1e-9)
     close = arm_clearance(hanging).min()
     assert close < ARMS_CLEAR < arm_clearance(clear_arms(hanging)).min()
-
-
-def test_a_turned_motion_faces_that_much_further_round_and_keeps_its_shape():
-    motion = make_motion("walk")
-    around = turn_about_vertical(motion, 2.0)
-    assert heading(around.poses[5]) == pytest.approx(heading(motion.poses[5]) + 2.0)
-    np.testing.assert_array_equal(around.poses[:, 1:], motion.poses[:, 1:])
-    x, y, z = (motion.translations - motion.translations[0]).T
-    # From +z towards +x.
-    expected = [np.cos(2.0) * x + np.sin(2.0) * z, y, np.cos(2.0) * z - np.sin(2.0) * x]
-    np.testing.assert_allclose(around.translations, np.transpose(expected), atol=1e-12)
 
 
 def test_place_faces_forward_on_the_floor():

@@ -10,8 +10,16 @@ from snug.body.skeleton import JOINT
 from snug.motion.files import HAND_DAMPING, HANDS, load_motions
 from snug.motion.library import make_motion
 from snug.motion.motion import Motion, clear_arms, place, resample, transition
-from tests.snug.motion.cmu_clips import amc_frame, write_clip
-from tests.snug.motion.motion_forms import TO_Z_UP, Y_UP, of_root, read, refuse, write_forms
+from tests.snug.motion.motion_forms import (
+    TO_Z_UP,
+    Y_UP,
+    amc_frame,
+    of_root,
+    read,
+    refuse,
+    write_clip,
+    write_forms,
+)
 
 KICK = make_motion("kick").cut(0, 40)
 WALK = make_motion("walk")

@@ -4,21 +4,12 @@ import numpy as np
 import pytest
 import torch
 
-from snug.body.skeleton import axis_angles, rotation_matrices
-from snug.motion.motion import Motion
+from snug.motion.motion import turn_about_vertical
 from snug.named_recipes import PAPER
 from snug.networks.regressor import Regressor
 from snug.networks.santesteban2019 import FitAndWrinkles
 from snug.recipe import DEFAULT, Recipe, RecipeError
 from tests.snug.training.dressing import leaning, swaying, tube_dress
-
-
-def turned(motion: Motion, angle: float, shift: np.ndarray) -> Motion:
-    """The whole motion, turned about the vertical at the pelvis and moved."""
-    turn = rotation_matrices(np.array([0.0, angle, 0.0]))
-    poses = motion.poses.copy()
-    poses[:, 0] = axis_angles(turn @ rotation_matrices(poses[:, 0]))
-    return Motion(motion.name, poses, motion.translations @ turn.T + shift, fps=motion.fps)
 
 
 def test_paper_scale_network_has_the_papers_size():
@@ -32,7 +23,8 @@ def test_paper_scale_network_has_the_papers_size():
 
 def test_default_inputs_know_no_heading_and_no_place():
     dressed, motion = tube_dress(), leaning(swaying())
-    moved = turned(motion, 1.1, np.array([3.0, 0.5, -2.0]))
+    moved = turn_about_vertical(motion, 1.1)
+    moved.translations[:] += [3.0, 0.5, -2.0]
     plain, other = (dressed.features(m, DEFAULT) for m in (motion, moved))
     assert torch.allclose(plain, other, atol=1e-6)
     literal = dressed.features(moved, PAPER) - dressed.features(motion, PAPER)
