@@ -138,9 +138,13 @@ class Effect:
         return math.log(factor) if self.scale == RATIO else 0.0
 
     def equal(self, factor: float = 1.0) -> bool:
-        """Return whether all of the interval lies within the margin; a value without one never does."""
-        ends = self.ends
-        return ends is not None and all(abs(end + self.shift(factor)) <= self.margin for end in ends)
+        """Return whether all of the interval lies within the margin; a value without one never does.
+
+        It has to with each simulation of smaller time steps in the reference's place.
+        """
+        moved = (0.0, *self.against.values())
+        ends = [end + self.shift(factor) for end in self.ends or ()]
+        return bool(ends) and all(abs(end + change) <= self.margin for end in ends for change in moved)
 
     def turned_by(self, factor: float = 1.0) -> list[str]:
         """Return the simulations with smaller time steps against which the effect has the other sign."""

@@ -3,7 +3,7 @@
 The rule looks at an effect (reports.statistics.effects) and, of an answer, at its corrected p-value:
 
     tie            all of the interval lies within the margin: 5 %, or the noise of the reference if that
-                   is more
+                   is more; against each simulation with smaller time steps too
     less, more     p is below 0.05, the difference exceeds the reference's noise, and has the same sign
                    against each simulation with smaller time steps
     inconclusive   anything else; fewer than LEAST_MOTIONS motions; a network of one seed

@@ -11,6 +11,7 @@ from pathlib import Path
 from reports.finished_run import Run
 from reports.tables.findings import (
     errors_in_spreads,
+    excess_by_time_step,
     extremes,
     findings,
     paper_table_1,
@@ -27,6 +28,7 @@ TABLES: tuple[Callable[[Run], list[Table]], ...] = (
     overview,
     paper_table_1,
     relative_excess,
+    excess_by_time_step,
     errors_in_spreads,
     findings,
     ablations,

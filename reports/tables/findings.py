@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import pandas as pd
 
 from benchmarks.metric import Metric
+from benchmarks.results.protocol import STARTS
 from reports.finished_run import Run
-from reports.statistics.effects import recording_of
+from reports.statistics.effects import EXCESS, off_scale, recording_of
 from reports.statistics.means_and_spreads import AT_REFERENCE, in_spreads
 from reports.statistics.outcomes import check_name, checks, stress_tests, tolerances_away
 from reports.statistics.paper_claims import judged
@@ -72,13 +74,9 @@ EXCESS_NOTE = (
 def relative_excess(run: Run) -> list[Table]:
     """Tabulate the relative excess of each method over the motions of a garment."""
     lines: list[tuple[Cell, ...]] = []
-    zero = {*run.with_role("reference", "reference-variant"), SKINNING}
-    for garment in run.garments(run.garment_rows):
-        rows = with_relative_excess(run, run.garment_rows[run.garment_rows["garment"] == garment])
-        for method in run.ordered(set(rows[rows["usable"]]["method"]) - zero):
-            if excess := excess_of(run, rows, method):
-                own = own_excess_of(run, rows, method)
-                lines.append((garment, method, own, *_cells_of(excess)))
+    for garment, method, excess in _excesses(run):
+        rows = run.garment_rows[run.garment_rows["garment"] == garment]
+        lines.append((garment, method, own_excess_of(run, rows, method), *_cells_of(excess)))
     columns = (
         GARMENT, METHOD, Column("own", "In own energies", "%", digits=2),
         Column("typical", "Typical", "%", digits=2), Column("recorded", "Recorded", "%", digits=2),
@@ -93,6 +91,39 @@ def relative_excess(run: Run) -> list[Table]:
         "typical of the library's recordings, and of other motions. Pooled: ratio of the sums over motions."
     )
     return table("relative_excess", columns, lines, caption, grouped_by=("garment",), note=EXCESS_NOTE)
+
+
+def excess_by_time_step(run: Run) -> list[Table]:
+    """Tabulate the typical relative excess against simulations with smaller time steps."""
+    members = [name for name in run.reference_family if name not in STARTS[1]]
+    lines: list[tuple[Cell, ...]] = []
+    for garment, method, excess in _excesses(run):
+        against = excess.effect.against
+        moved = [
+            off_scale(excess.effect.value + against[name], EXCESS) if name in against else None
+            for name in members
+        ]
+        if against:
+            lines.append((garment, method, excess.typical, *moved))
+    columns = (
+        GARMENT, METHOD,
+        *(Column(name, run.label(name), "%", digits=2) for name in (run.reference, *members)),
+    )  # fmt: skip
+    caption = (
+        "Typical relative excess against each simulation in the reference's place. Below zero: less total "
+        "energy than that simulation."
+    )
+    return table("excess_by_time_step", columns, lines, caption, grouped_by=("garment",))
+
+
+def _excesses(run: Run) -> Iterator[tuple[str, str, Excess]]:
+    """Yield garment, method and relative excess of each method but references and skinning."""
+    zero = {*run.with_role("reference", "reference-variant"), SKINNING}
+    for garment in run.garments(run.garment_rows):
+        rows = with_relative_excess(run, run.garment_rows[run.garment_rows["garment"] == garment])
+        for method in run.ordered(set(rows[rows["usable"]]["method"]) - zero):
+            if excess := excess_of(run, rows, method):
+                yield garment, method, excess
 
 
 def _cells_of(excess: Excess) -> tuple[Cell, ...]:

@@ -301,6 +301,12 @@ def test_a_verdict_stands_where_every_time_step_has_its_sign(change, expected):
     assert why_open(far) == (": other sign against simulation-dt/8" if expected == "inconclusive" else "")
 
 
+@pytest.mark.parametrize(("change", "expected"), [(0.02, "tie"), (0.2, "inconclusive")])
+def test_a_tie_is_one_against_every_time_step(change, expected):
+    near = Effect(0.0, RATIO, error=0.01, freedom=10.0, motions=20, against={"simulation-dt/8": change})
+    assert standing(near, near.p_value()) == expected
+
+
 def test_uncertainties_of_two_runs_add_up_as_independent_ones():
     rows = [row(method=method, value=value) for method, value in (("snug", 2.0), ("pbns", 4.0))]
     frame = run_of(rows).frame
