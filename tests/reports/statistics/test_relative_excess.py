@@ -63,7 +63,9 @@ def test_means_are_over_sources_recorded_ones_apart_and_the_pooled_share_over_mo
 
 def test_a_method_with_less_energy_than_a_finer_simulation_is_below_zero_against_it():
     energies = {"simulation": 1.0, "simulation-dt/4": 1.4, "skinning": 2.4, "snug": 1.2, "pbns": 1.6}
-    rows = [row(f"tshirt/{clip}", name, "energy/total", x) for name, x in energies.items() for clip in "ab"]
+    rows = [
+        row(f"tshirt/{clip}", name, "energy/total", x) for name, x in energies.items() for clip in "ab"
+    ]
     (made,) = excess_by_time_step(run_of(rows))
     assert [column.name for column in made.columns[2:]] == ["simulation", "simulation-dt/4"]
     shown = {method: numbers for _, method, *numbers in made.rows}
