@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +14,7 @@ from benchmarks.metrics import find_metric
 from benchmarks.results.row import Row
 from benchmarks.results.run_folder import FORMAT, RunFolder
 from reference_sim import Trajectory
-from reports.finished_run import RollOuts, Run, make_run
+from reports.finished_run import Run, make_run
 
 TERMS = {"strain": 0.1, "bending": 0.01, "gravity": 0.3, "inertia": 0.004, "collision": 0.02}
 SHOWN = {"simulation": 1.0, "skinning": 9.0, "snug": 2.0, "pbns": 3.0}
@@ -71,27 +70,13 @@ def run_folder(path: Path, rows: Sequence[Row], **more) -> RunFolder:
     return folder
 
 
-@dataclass(frozen=True)
-class Stored(RollOuts):
-    """The same roll-out for every method of every scene."""
-
-    stored: Trajectory | None = None
-
-    def cloth(self, scene: str, method: str, seed: int) -> Trajectory | None:
-        return self.stored
-
-
 def write_mesh(
     path: Path, positions: np.ndarray, faces: np.ndarray, fields: dict[str, np.ndarray]
 ) -> None:
     """A trajectory file."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    mesh(positions, faces, fields).save(path)
-
-
-def mesh(positions: np.ndarray, faces: np.ndarray, fields: dict[str, np.ndarray]) -> Trajectory:
     times = np.arange(len(positions)) / 30.0
-    return Trajectory(positions, faces, times, np.zeros(len(positions)), frame_fields=fields)
+    Trajectory(positions, faces, times, np.zeros(len(positions)), frame_fields=fields).save(path)
 
 
 def write_roll_outs(run: RunFolder, scenes: Iterable[str], methods: Iterable[str]) -> None:

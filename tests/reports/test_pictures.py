@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from PIL import Image
@@ -13,26 +11,33 @@ from reference_sim import Trajectory
 from reference_sim.files.mesh_files import read_mesh
 from reference_sim.trajectory import read_point_cache
 from reports import film, pictures
-from reports.pictures import SceneRollOuts, camera_axes, draw_side_by_side, failures, worst_frame
-from tests.reports.report_folder import FRAMES, Stored, mesh, row, run_folder, run_of, sheet, write_mesh
+from reports.finished_run import read_run
+from reports.pictures import camera_axes, draw_side_by_side, failures, worst_frame
+from tests.reports.report_folder import FRAMES, row, run_folder, run_of, sheet, write_mesh
+
+SCENE = "tshirt/walk"
+STRAINS = {"simulation": 0.1, "skinning": 0.1, "snug": 2.0}
+ROWS = [row(SCENE, method, "energy/strain", value) for method, value in STRAINS.items()]
 
 
-def scene_of(methods, height=0.1):
-    cloth, faces = sheet(height)
-    inertia = {"energy/inertia": np.array([0.0, 0.0, 1.0, 5.0, 2.0])}
-    series = {
-        method: mesh(cloth[:frames], faces, {name: values[:frames] for name, values in inertia.items()})
-        for method, frames in methods.items()
-    }
-    return SceneRollOuts("tshirt/a", series, mesh(*sheet(0.0), {}))
+@pytest.fixture(scope="module")
+def run(tmp_path_factory) -> RunFolder:
+    """A simulation that moves, skinning that stands still, and a network that ended early."""
+    folder = run_folder(tmp_path_factory.mktemp("run"), ROWS)
+    write_mesh(folder.trajectory_path(SCENE, "body"), *sheet(-0.2), {})
+    still, faces = sheet(0.0)
+    moved = still + np.array([0.0, 0.06, 0.0]) * np.arange(FRAMES)[:, None, None]
+    inertia, strain = np.array([0.0, 0.0, 1.0, 5.0, 2.0]), np.array([0.0, 9.0, 1.0, 1.0, 1.0])
+    for method, x in {"simulation": moved, "skinning": still, "snug": still[:3]}.items():
+        fields = {"energy/inertia": inertia[: len(x)], "energy/strain": strain[: len(x)]}
+        write_mesh(folder.trajectory_path(SCENE, method), x, faces, fields)
+    return folder
 
 
-def test_what_ended_early_moves_nobody_elses_picture():
-    shown = scene_of({"simulation": FRAMES, "snug": FRAMES, "lbfgs-5": 2})
-    run = run_of([row(method=method) for method in shown.series])
-    drawing = draw_side_by_side(run, shown, ["simulation", "snug"])
-    assert "frame 3 " in drawing.caption
-    assert drawing.caption.endswith("want of room: L-BFGS, 5 iterations.")
+def test_what_ended_early_moves_nobody_elses_picture(run):
+    shown = film.select_roll_outs(run, SCENE, list(STRAINS))
+    drawing = draw_side_by_side(read_run(run), shown, ["simulation", "skinning"])
+    assert "frame 3 " in drawing.caption and drawing.caption.endswith("want of room: SNUG.")
 
 
 def test_a_view_shows_the_nearer_surface_and_what_lies_behind_around_it():
@@ -51,35 +56,11 @@ def test_a_view_shows_the_nearer_surface_and_what_lies_behind_around_it():
     assert image[line - 2, column + 2].max() < 1.0 or image[line - 2, column + 2, 2] < 0.9
 
 
-def test_a_failure_is_shown_at_its_worst_frame():
-    rows = [row("tshirt/a", m, "energy/strain", v) for m, v in (("simulation", 0.1), ("snug", 2.0))]
-    run = run_of(rows)
-    cloth, faces = sheet(0.1)
-    strain = {"energy/strain": np.array([0.0, 9.0, 1.0, 1.0, 1.0])}
-    assert list(failures(run)) == []
-    stored = replace(run, roll_outs=Stored(stored=mesh(cloth, faces, strain)))
-    (drawing,) = failures(stored)
-    assert drawing.name == "failures" and worst_frame(mesh(cloth, faces, strain)) == 1
-
-
-SCENE = "tshirt/walk"
-
-
-@pytest.fixture(scope="module")
-def run(tmp_path_factory) -> RunFolder:
-    """A simulation that moves, skinning that stands still, and a network that ended early."""
-    rows = [row(SCENE, method) for method in ("simulation", "skinning", "snug")]
-    folder = run_folder(tmp_path_factory.mktemp("run"), rows)
-    body, faces = sheet(-0.2)
-    write_mesh(folder.trajectory_path(SCENE, "body"), body, faces, {})
-    for method in ("simulation", "skinning", "snug"):
-        cloth, faces = sheet(0.0)
-        if method == "simulation":
-            cloth += np.array([0.0, 0.06, 0.0]) * np.arange(len(cloth))[:, None, None]
-        if method == "snug":
-            cloth = cloth[:2]
-        write_mesh(folder.trajectory_path(SCENE, method), cloth, faces, {})
-    return folder
+def test_a_failure_is_shown_at_its_worst_frame(run):
+    assert list(failures(run_of(ROWS))) == []  # without roll-outs
+    (drawing,) = failures(read_run(run))
+    snug = Trajectory.load(run.trajectory_path(SCENE, "snug"))
+    assert drawing.name == "failures" and worst_frame(snug) == 1
 
 
 def filmed(run, path, *more) -> int:
@@ -121,13 +102,8 @@ def test_a_roll_out_that_ended_early_says_so_and_keeps_its_last_frame(run):
     frames = [np.asarray(frame, int) for frame in film.draw_frames(selected, 100, 25.0)]
     assert len(frames) == 5 and list(selected.labels.values()) == ["Simulation", "SNUG"]
     foot = slice(-4 * 12, -2 * 12)  # the last line of a view: letters are 12 pixels high
-    assert [(frame[foot, 100:] == film.INK[0]).any() for frame in frames] == [
-        False,
-        False,
-        True,
-        True,
-        True,
-    ]
+    ended = [bool((frame[foot, 100:] == film.INK[0]).any()) for frame in frames]
+    assert ended == [False] * 3 + [True] * 2
     cloth = selected.series["snug"]
     assert np.array_equal(cloth.positions[-1], film.drawn(cloth, 4, (0.0, 0.0, 0.0)).positions)
 
@@ -145,20 +121,16 @@ def test_point_caches_of_garment_and_body_have_their_meshes_beside_them(run, tmp
         assert np.array_equal(first.faces, mesh.faces)
 
 
-def kept_of(*positions: np.ndarray) -> film.SceneRollOuts:
-    faces = np.array([[0, 1, 2]])
-    cloths = {str(k): Trajectory(x, faces, np.arange(len(x)) / 30.0) for k, x in enumerate(positions)}
-    return film.SceneRollOuts("", cloths)
-
-
 def test_all_cloths_are_in_sight_of_one_camera_in_every_frame():
     rng = np.random.default_rng(3)
     walk = np.cumsum(rng.normal(0.0, 0.2, (40, 1, 3)), axis=0)
     one, other = (walk[:n] + rng.normal(0.0, 0.4, (n, 30, 3)) for n in (40, 25))
+    faces = np.array([[0, 1, 2]])
+    cloths = {str(n): Trajectory(x, faces, np.arange(len(x)) / 30.0) for n, x in enumerate((one, other))}
     for azimuth in (0.0, 25.0, 180.0, -90.0):
         axes = camera_axes(azimuth)
         assert axes.T @ axes == pytest.approx(np.eye(3), abs=1e-12) and np.linalg.det(axes) > 0.0
-        centres, half = film.camera_path(kept_of(one, other), axes)
+        centres, half = film.camera_path(film.SceneRollOuts("", cloths), axes)
         for cloth in (one, np.concatenate([other, np.repeat(other[-1:], 15, axis=0)])):
             seen = (cloth - centres[:, None]) @ axes
             assert np.abs(seen[..., 1]).max() <= half and np.abs(seen[..., 0]).max() <= half / film.TALL

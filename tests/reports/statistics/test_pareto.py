@@ -47,12 +47,6 @@ def all_rows() -> list[Row]:
             rows += [row(scene, method, "cost/frame", time, "ms"), row(scene, method, "gap/energy", gap)]
             if curvature is not None:
                 rows.append(row(scene, method, "curvature/error", curvature, "1/m"))
-                rows.append(row(scene, method, "distance/rms", 10.0 * curvature, "mm"))
-        rows.append(row(scene, "snug", "cost/train", 200.0, "s"))
-        rows.append(row(scene, "snug", "cost/data", 0.0, "s"))
-        for member in ("simulation-perturbed-1e-4", "simulation-1e-8"):
-            rows.append(row(scene, member, "distance/rms", 21.0, "mm"))
-        rows.append(row(scene, "simulation", "gap/refrozen", 0.015, "J"))
     for method in ("simulation", "newton-1", "newton-4"):
         time, gap, _ = WORN[method]
         rows += [row("sheet", method, "cost/frame", time, "ms"), row("sheet", method, "gap/energy", gap)]
