@@ -8,13 +8,15 @@ import numpy as np
 import pytest
 import torch
 
+from reference_sim.geometry.surface import vertex_normals
 from snug.body.skeleton import JOINT
 from snug.body.skinning import skin
-from snug.kernels.contact import triangle_adjacency
+from snug.kernels.contact import byte_normals, triangle_adjacency
 from snug.recipe import DEFAULT
 from snug.training import contact_planes
 from snug.training.augmentation import augment
 from snug.training.contact_planes import MARKED, NEAR, REACH
+from tests.reference_sim.meshes import sphere
 from tests.snug.training.dressing import PLAIN, make_trainer, swaying, tube_dress
 
 MOTIONS = [swaying(30), swaying(11, name="slow", degrees=10.0)]
@@ -23,6 +25,14 @@ MOTIONS = [swaying(30), swaying(11, name="slow", degrees=10.0)]
 def test_across_a_side_lies_the_face_that_shares_it():
     faces = np.array([[0, 1, 2], [2, 1, 3], [3, 1, 4]])
     assert triangle_adjacency(faces).tolist() == [[1, -1, -1], [2, -1, 0], [-1, -1, 1]]
+
+
+def test_normals_of_more_frames_than_lanes_are_those_of_each():
+    vertices, faces = sphere(2, 0.1)
+    moved = vertices + np.random.default_rng(0).normal(scale=0.01, size=(21, *vertices.shape))
+    normals = byte_normals(moved.astype(np.float32), faces.astype(np.int32))
+    exact = 127 * np.array([vertex_normals(frame, faces) for frame in moved])
+    assert normals.dtype == np.int8 and np.abs(normals - exact).max() < 0.5 + 1e-3
 
 
 @pytest.mark.parametrize("kernels", [True, False])
