@@ -59,7 +59,9 @@ class Recipe:
         shape_of: receivers of a shape: each `window` in each step anew, as the paper has it, or each
             augmented `clip` once, while original motions stay on the mean body.
         shape_share: share of these clips that leave the mean body.
-        contact_samples: `all` (vertices, edge midpoints, centroids) or `vertices`.
+        contact_samples: `all` (vertices, edge midpoints, centroids), `vertices`, or `nearest_vertices`
+            (vertices, each by the tangent plane at the body vertex nearest to it, searched anew in every
+            frame of every step, and as stiff on each vertex: the published code of SNUG's authors).
         contact_stiffness: of ContactPenalty, per area of cloth [J/m^5]; None takes the simulator's
             default.
         contact_margin: of ContactPenalty; None takes the simulator's default.
@@ -117,7 +119,7 @@ class Recipe:
             ("initialisation", INITIALISATIONS),
             ("inertia_form", INERTIA_FORMS),
             ("schedule", ("cosine", "epochs")),
-            ("contact_samples", ("all", "vertices")),
+            ("contact_samples", ("all", "vertices", "nearest_vertices")),
             ("material", ("stvk", "springs", "pbns")),
             ("bending", ("length_area", "none")),
             ("shape_of", ("window", "clip")),

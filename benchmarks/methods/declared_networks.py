@@ -11,7 +11,7 @@ from typing import Any
 
 from benchmarks.method import MethodEntry, Reporting, Simulated, Training
 from snug.kinds import KINDS
-from snug.named_recipes import ABLATIONS, PAPER, PAPER_CONTACT, PBNS_SPRINGS
+from snug.named_recipes import ABLATIONS, PAPER, PAPERS, PBNS_SPRINGS
 
 TRAININGS = {
     **{
@@ -20,7 +20,7 @@ TRAININGS = {
     },
     "pbns-paper": Training("pbns", PAPER),
     "pbns-springs": Training("pbns", PBNS_SPRINGS),
-    **{f"snug-{recipe.name}": Training("snug", recipe) for recipe in (PAPER, PAPER_CONTACT, *ABLATIONS)},
+    **{f"snug-{recipe.name}": Training("snug", recipe) for recipe in (*PAPERS, *ABLATIONS)},
 }
 
 
@@ -90,6 +90,9 @@ NAMED = (
             base="snug", pairing_group="snug"),
     network("snug-paper-contact", "SNUG, paper's text, simulator's contact",
             "SNUG by the paper's text, but for the contact, which is that of the scene",
+            base="snug-paper", pairing_group="snug"),
+    network("snug-paper-nearest-vertex", "SNUG, paper's text, nearest body vertex",
+            "SNUG by the paper's text, its contact planes at the nearest body vertices, as its authors' code",
             base="snug-paper", pairing_group="snug"),
     *(
         network(f"handles-{count}", "",

@@ -27,13 +27,16 @@ class CapturedTrainer(Trainer):
     """A trainer with two graphs: from the windows to gradients, and the update by these.
 
     Where a step cannot be captured it takes every step in single operations: the step must be on the
-    energies alone, the network read no frames before its windows, and no motion have a body of its own.
+    energies alone, the network read no frames before its windows, no motion have a body of its own, and
+    contact have anchors, for a search for nearest vertices is on the CPU.
     """
 
     def __init__(self, *arguments: Any, **options: Any) -> None:
         super().__init__(*arguments, **options)
         self.capturable = bool(
-            self.loss and not self.kernels and not self.network.lead and self.data.shapes is None
+            self.loss
+            and not (self.kernels or self.nearest or self.network.lead)
+            and self.data.shapes is None
         )
         self.captured_steps = self._asked = 0
         self._descent = CudaGraph(self._differentiated, self.device)

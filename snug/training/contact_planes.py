@@ -1,8 +1,8 @@
-"""Contact planes of batches of a training set, from cached anchors, queried anew as the network learns.
+"""Contact planes of batches of a training set: from cached anchors, or at the nearest body vertices.
 
-The middle frames of a few windows in a step are searched, for skin that no walk would reach. Their
-anchors are propagated to the frames around them that show almost the same pose: farther off the thigh is
-elsewhere.
+Anchors are queried anew as the network learns: the middle frames of a few windows in a step are searched,
+for skin that no walk would reach. Their anchors are propagated to the frames around them that show almost
+the same pose: farther off the thigh is elsewhere.
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ MARKED = 25  # every so many vertices of the patch there is a mark
 
 
 class BodyPatches:
-    """The patch of a body in every frame of a training set.
+    """The patch of a body, its `vertices` (P,), in every frame of a training set.
 
-    Anchors of a ContactCache lie on arrays that kernels pose, others on tensors that torch poses on the
-    set's device. kept: whether each frame has one body for good; the kernels then pose them all once.
+    normals: vertex normals (N, P, 3) of positions (N, P, 3). kernels: pose arrays, else tensors by torch on
+    the set's device. kept: whether each frame has one body for good; the kernels then pose them all once.
     """
 
     def __init__(
-        self, data: TrainingSet, cache: ContactCache | TensorContactCache, *, kept: bool
-    ) -> None:
-        body, vertices, device = data.dressed.body, cache.patch.body_vertices, data.device
-        self.data, self.kernels = data, isinstance(cache, ContactCache)
-        self.normals: Callable[[Any], Any] = cache.normals
+        self, data: TrainingSet, vertices: np.ndarray, normals: Callable[[Any], Any], *,
+        kernels: bool, kept: bool,
+    ) -> None:  # fmt: skip
+        body, device = data.dressed.body, data.device
+        self.data, self.kernels, self.normals = data, kernels, normals
         self.weights, self.template, self.directions = (
             torch.as_tensor(array[vertices], dtype=torch.float32, device=device)
             for array in (body.skinning_weights, body.template, body.shape_directions)
@@ -126,6 +126,43 @@ class BodyPatches:
             yield self.template + moved, slice(int(start), int(stop))
 
 
+class NearestVertices:
+    """Tangent planes at the body vertices nearest to those of the garment: nothing is kept from step to step.
+
+    As SNUG's authors have published it (github.com/isantesteban/snug, losses/physics.py, lines 138 to 148;
+    layers.py, lines 38 to 56; normals in smpl.py): all vertices of the body, normals weighted by area. Planes
+    hold still while the loss is differentiated.
+    """
+
+    def __init__(self, data: TrainingSet) -> None:
+        body = data.dressed.body
+        self.faces = torch.as_tensor(body.faces, device=data.device).long()
+        vertices = np.arange(len(body.template))
+        self.bodies = BodyPatches(data, vertices, self._normals, kernels=False, kept=False)
+
+    def planes(self, batch: Batch, x: Tensor) -> tuple[Tensor, Tensor]:
+        """Return points and normals (N, T, V, 3) of garments x (N, T, V, 3) in the poses of a batch [m]."""
+        from scipy.spatial import cKDTree
+
+        _, *posed = self.bodies.posed(batch)
+        garments = np.nan_to_num(
+            x.detach().flatten(0, 1).cpu().numpy()
+        )  # what is no number, the loss says
+        nearest = [
+            cKDTree(body, balanced_tree=False, compact_nodes=False).query(garment)[1]
+            for body, garment in zip(posed[0].cpu().numpy(), garments)
+        ]
+        index = torch.as_tensor(np.stack(nearest), device=x.device)[..., None].expand(-1, -1, 3)
+        points, normals = (of_body.gather(1, index).view_as(x) for of_body in posed)
+        return points, normals
+
+    def _normals(self, positions: Tensor) -> Tensor:
+        a, b, c = (positions[:, self.faces[:, corner]] for corner in range(3))
+        of_corners = torch.linalg.cross(b - a, c - a).repeat_interleave(3, dim=1)
+        sums = torch.zeros_like(positions).index_add(1, self.faces.flatten(), of_corners)
+        return torch.nn.functional.normalize(sums, dim=-1)
+
+
 # Frames searched after a step, as a share of the batch's, at most one of each window.
 REFRESH = 0.01
 # Frames before and after a searched one that may take over its anchors; at the start.
@@ -152,7 +189,8 @@ class TrainingContact:
             if kernels
             else TensorContactCache(self.patch, frames, device)
         )
-        self.bodies = BodyPatches(data, self.cache, kept=kept)
+        vertices, normals = self.patch.body_vertices, self.cache.normals
+        self.bodies = BodyPatches(data, vertices, normals, kernels=kernels, kept=kept)
         self.stencils = torch.as_tensor(contact.stencils, device=device)
         self.sample_weights = torch.as_tensor(contact.weights, dtype=torch.float32, device=device)
         self._changed = np.zeros(frames, bool)

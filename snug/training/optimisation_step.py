@@ -22,7 +22,7 @@ from snug.networks.garment_network import GarmentNetwork, make_network
 from snug.networks.tensor_file import select_tensors
 from snug.recipe import Recipe
 from snug.training.augmentation import make_training_set, varies_shape
-from snug.training.contact_planes import Posed, TrainingContact
+from snug.training.contact_planes import NearestVertices, Posed, TrainingContact
 from snug.training.device import CPU, compiled
 from snug.training.divergence_guard import SETTLING, DivergenceGuard, live_tensors
 from snug.training.physics_loss import PhysicsLoss
@@ -98,11 +98,14 @@ class Trainer:
         self.epoch = 0
         self.loss: PhysicsLoss | None = None
         self.contact: TrainingContact | None = None
+        self.nearest: NearestVertices | None = None  # in place of anchors
         self.targets: VertexTargets | None = None
         if how.physics:
             self.loss = PhysicsLoss(
                 dressed.cloth, recipe, dt=self.data.dt, device=device, kernels=self.kernels
             )
+            if recipe.contact_samples == "nearest_vertices":
+                self.nearest = NearestVertices(self.data)
             self.contact = self.contact_of(self.data)
         else:
             self.targets = TARGETS[how.targets](self.data, motions, trajectories, self.weights)
@@ -119,8 +122,8 @@ class Trainer:
         )
 
     def contact_of(self, data: TrainingSet) -> TrainingContact | None:
-        """Return contact anchors for the frames of a set; None if the recipe has no collision."""
-        if self.loss is None or "collision" not in self.recipe.terms:
+        """Return contact anchors for the frames of a set; None without collision, or where none are kept."""
+        if self.loss is None or self.nearest or "collision" not in self.recipe.terms:
             return None
         return TrainingContact(data, self.loss.contact, kept=not self.shaped, kernels=self.kernels)
 
@@ -166,6 +169,8 @@ class Trainer:
         if self.contact:
             posed = self.contact.bodies.posed(batch)
             planes = self.contact.planes(batch, posed, x)
+        elif self.nearest:
+            planes = self.nearest.planes(batch, x)
         terms = self.loss(x, batch.ahead, planes, behind=batch.behind)
         if self.contact and posed and self._searched_for_high(number, batch.frames, posed, x, terms):
             planes = self.contact.planes(batch, posed)

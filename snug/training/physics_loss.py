@@ -111,12 +111,20 @@ def static_terms(cloth: Cloth, recipe: Recipe) -> dict[str, Energy]:
 
 
 def make_contact(cloth: Cloth, recipe: Recipe) -> ContactPenalty:
-    """Return the recipe's contact term; options it leaves open are the simulator's defaults."""
+    """Return the recipe's contact term; options it leaves open are the simulator's defaults.
+
+    For `nearest_vertices` the stiffness is the same on each vertex, in the mean that of the recipe; whoever
+    evaluates the term gives it its planes.
+    """
     if recipe.material == "pbns":
         return SquaredContact(cloth)
     options = {"margin": recipe.contact_margin, "stiffness": recipe.contact_stiffness}
     given: dict[str, Any] = {name: value for name, value in options.items() if value is not None}
-    return ContactPenalty(cloth, samples=recipe.contact_samples, **given)
+    if recipe.contact_samples != "nearest_vertices":
+        return ContactPenalty(cloth, samples=recipe.contact_samples, **given)
+    contact = ContactPenalty(cloth, samples="vertices", **given)
+    contact.stiffness[:] = contact.stiffness.mean()
+    return contact
 
 
 class ClosedForms(torch.autograd.Function):

@@ -92,4 +92,6 @@ class Validator:
             posed = self.contact.bodies.posed(batch)
             self.contact.search(np.arange(batch.frames.size), batch.frames, posed, x, exact=True)
             planes = self.contact.planes(batch, posed)
+        elif trainer.nearest:
+            planes = trainer.nearest.planes(batch, x)
         return trainer.loss(x, batch.ahead, planes, behind=batch.behind)
