@@ -10,3 +10,4 @@ positions, faces = square_sheet(8, 0.4)
 cloth = Cloth(positions, faces, pins=[0, 8])
 result = simulate(cloth, [HenckySpring(cloth), Gravity(cloth)], frames=10, method="lbfgs")
 assert result.status == "converged", result.reason
+print(f"its lowest point is at y = {result.positions[-1, :, 1].min():.3f} m")

@@ -10,32 +10,11 @@ import pytest
 from benchmarks import check
 from benchmarks.check import ContractError, check_derivatives
 from benchmarks.validation.equilibrium import DeadLoad
-from tests.benchmarks.plan.outside_files import METRIC_FILE, SCENE_FILE, as_before
+from tests.benchmarks.plan.outside_files import METHOD, METRIC_FILE, SCENE_FILE, as_before
 from tests.benchmarks.runner.tasks_by_hand import InProcess, small_scene
 
 _as_before = pytest.fixture(autouse=True)(as_before)
 
-METHOD_FILE = """import numpy as np
-from benchmarks import Method, MethodEntry
-from reference_sim import Trajectory
-
-METHODS = (MethodEntry(name="still", description="a method", role="solver"),)
-
-class Still(Method):
-    def prepare(self, scene):
-        self.scene = scene
-
-    def run(self):
-        scene = self.scene
-        x = np.repeat(np.array(scene.start)[None], scene.frames, axis=0)
-        pass
-        return Trajectory(x, scene.cloth.faces, np.arange(len(x)) * scene.dt)
-
-def make(*, models, seed):
-    method = Still()
-    method.seed = seed
-    return method
-"""
 IN_SHEET = ("--scene", "hanging_sheet", "--set", "sizes=smoke")
 FINER = "return Trajectory(np.zeros((10, 3, 3)), np.array([[0, 1, 2]]), np.arange(10) * scene.dt)"
 BREACHES = {  # a line of run(): what is said of it
@@ -57,13 +36,16 @@ def judge(roll_out, values):
     return """
 TWICE, ARRAY = "-2.0 * self.cloth.masses[:, None] *", METRIC_FILE.replace("float(", "")
 FILES = {  # a file: what is wrong with it
-    METHOD_FILE: "",
-    METHOD_FILE.replace('"solver"', '"solver", other_mesh=True').replace("pass", FINER): "",
-    **{METHOD_FILE.replace("pass", line): fault for line, fault in BREACHES.items()},
+    METHOD: "",
+    METHOD.replace('"solver"', '"solver", other_mesh=True').replace("pass", FINER): "",
+    **{METHOD.replace("pass", line): fault for line, fault in BREACHES.items()},
     SCENE_FILE: "",
     SCENE_FILE.replace(
         "-self.cloth.masses[:, None] *", TWICE
     ): "lift: its gradient is not the derivative",
+    SCENE_FILE.replace("), 0.1", "), 33.3"): "dt 33.3: give the duration of a frame in seconds, above 0",
+    SCENE_FILE.replace("dt=dt", "dt=dt, warm_up=1"): "warm_up 1: give 2 frames or more",
+    SCENE_FILE.replace("(Lift(cloth),)", "2 * (Lift(cloth),)"): "energy 'lift' is declared twice",
     METRIC_FILE: "",
     "import numpy\n" + METRIC_FILE.replace("float(", "numpy.float32("): "",  # as a run takes it
     METRIC_FILE + JUDGED + "('diverged', 'lost')": "",
@@ -95,9 +77,7 @@ def test_the_command_names_what_is_wrong_in_a_file_and_its_remedy(number, file, 
 
 def test_a_method_is_checked_in_three_scenes_and_one_that_is_bound_to_a_mesh_where_it_is(file, capsys):
     bound = "assert scene.cloth.vertex_count == 49, 'bound to 49 vertices'"
-    assert (
-        check.main([file(METHOD_FILE.replace("self.scene = scene", f"{bound}; self.scene = scene"))]) == 1
-    )
+    assert check.main([file(METHOD.replace("self.scene = scene", f"{bound}; self.scene = scene"))]) == 1
     out = capsys.readouterr().out
     assert out.count("bound to 49 vertices") == 3 and "still in tshirt/kick: wrong" in out
 

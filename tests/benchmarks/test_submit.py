@@ -15,8 +15,8 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.scenes import find_scene
 from benchmarks.submit import main
 from snug.motion.library import TEST
+from tests.benchmarks.plan.outside_files import METHOD
 from tests.benchmarks.runner.tasks_by_hand import run_in_this_process
-from tests.benchmarks.test_contract import METHOD_FILE
 
 SUBMISSIONS = Path(__file__).resolve().parents[2] / "submissions"
 FOLDERS = sorted(path.parent for path in SUBMISSIONS.glob("*/entry.toml"))
@@ -120,7 +120,7 @@ def test_a_program_of_another_name_or_that_fails_within_a_scene_is_not_scored(
     entry, capsys, name, spoilt, fault
 ):
     file = f"{name}_program.py"  # which Python has not met
-    text = METHOD_FILE.replace('"still"', f'"{name}"').replace("pass", spoilt)
+    text = METHOD.replace('"still"', f'"{name}"').replace("pass", spoilt)
     (entry / "entry.toml").write_text(TEXT.replace("roll_outs", "program").replace("{scene}.npz", file))
     (entry / file).write_text(text)
     assert main(["score", str(entry)]) == 2

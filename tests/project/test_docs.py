@@ -25,7 +25,11 @@ TOGETHER = (
     "smoke --scenes hanging_sheet,./curtain.py"
     " --methods simulation,newton-1,./held.py,./explicit.py --set metrics=./height.py -o "
 )
-WITHOUT_RESULTS = ("How to add something", "An energy")
+# Last words of the sections whose commands leave no results.
+LAST_WORDS = {
+    "How to add something": "nothing is wrong\n",
+    "An energy": "its lowest point is at y = -0.XXX m\n",
+}
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
 
@@ -53,12 +57,14 @@ def user(tmp_path_factory) -> Path:
     return folder
 
 
-def run(folder: Path, line: str) -> None:
+def run(folder: Path, line: str) -> str:
+    """Run a line as it stands in a user's folder, and return what it prints."""
     search_path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
     environment = os.environ | {"PYTHONPATH": str(ROOT), "PATH": search_path, "MPLBACKEND": "Agg"}
     command = ["bash", "-ec", line]
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
     assert done.returncode == 0, f"{line}\n{done.stdout[-2000:]}{done.stderr[-4000:]}"
+    return done.stdout
 
 
 def judge(title: str, folder: Path) -> None:
@@ -76,32 +82,38 @@ def judge(title: str, folder: Path) -> None:
         # In n frames backward Euler falls (n + 1) / n times as far.
         assert total["explicit-200"] == pytest.approx(total["simulation"], rel=0.2)
         assert total["held"] > total["simulation"]  # it keeps its height
-    if title == "A network of your own":
+    elif title == "A network of your own":
         skinned = values("energy/strain")
         assert skinned["pose-network"] != skinned["skinning"] > 0.0  # a little trained, on another motion
-    if title == "A program":
+    elif title == "A program":
         off = values("exact/distance")
         assert off.keys() == {"simulation", "fall"} and max(off.values()) < 1e-9
-    if title == "A scene":
+    elif title == "A scene":
         # The section on energies gives the curtain its wind, which does work on it.
         wind = values("energy/wind", "curtain")
         assert wind["simulation"] < 0.0 > wind["newton-1"]
         assert {row["scene"] for row in rows if row["metric"] == "energy/wind"} == {"curtain"}
-    if title == "A metric":
+    elif title == "A metric":
         assert {row["unit"] for row in rows if row["metric"] == "height/lowest"} == {"m"}
         table = (folder / "tables" / "height_by_scene.csv").read_text(encoding="utf-8")
         assert table.startswith("suite,scene,method,height/lowest [m],")
-    if title == "A recipe":
+    elif title == "A recipe":
         assert {row["method"] for row in rows} == {"snug-windy"}
+    elif title == "A known answer":
+        assert values("check", "sheet_at_rest") == {"simulation": pytest.approx(0.0, abs=1e-12)}
+        assert values("height/lowest", "curtain").keys() == {"simulation", "held"}
+    else:
+        pytest.fail(f"nothing is expected of the section {title!r}")
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("title", EXAMPLE_SECTIONS)
 def test_an_example_of_extending_runs_as_written(title, user, tmp_path):
-    for _, language, content in blocks(SECTIONS[title]):
-        if language == "sh":
-            run(user, content.replace("DIR", str(tmp_path)).rstrip())
-    if title not in WITHOUT_RESULTS:
+    shells = [content for _, language, content in blocks(SECTIONS[title]) if language == "sh"]
+    *_, said = [run(user, content.replace("DIR", str(tmp_path)).rstrip()) for content in shells]
+    if title in LAST_WORDS:
+        assert said.endswith(LAST_WORDS[title])
+    else:
         judge(title, tmp_path)
 
 

@@ -52,17 +52,13 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
         return dict(stored)
 
 
-def rodrigues(poses: np.ndarray) -> np.ndarray:
-    """Rotations (..., 3, 3) of axis-angles (..., 3), by the matrix exponential."""
-    return expm(np.cross(np.eye(3), poses[..., None, :]))
-
-
 def skinned_elsewhere(folder: Path, motion: str, turn: np.ndarray) -> np.ndarray:
     """Linear blend skinning from the exported files alone. turn: from the motion's axes to y up."""
     given, moved = arrays(folder / "skinning.npz"), arrays(folder / motion)
     joints, parents = given["joints"], given["parents"]
     frames = len(moved["poses"])
-    local = rodrigues(moved["poses"].reshape(frames, -1, 3))
+    vectors = moved["poses"].reshape(frames, -1, 1, 3)
+    local = expm(np.cross(np.eye(3), vectors))  # the matrix exponential turns them into rotations
     world, at = np.empty((frames, 24, 3, 3)), np.empty((frames, 24, 3))
     for j, parent in enumerate(parents):
         rotation = local[:, j] if j < 22 or motion == "motion_smpl.npz" else np.eye(3)[None]

@@ -22,6 +22,7 @@ from benchmarks.metric import Estimate, RollOut
 from benchmarks.plan.study import option, read_study
 from benchmarks.runner.cells import judge
 from benchmarks.runner.measurements import measured
+from benchmarks.scenes.from_roll_out import declared
 from benchmarks.timing import Reading
 from reference_sim import Trajectory
 from reference_sim.trajectory import (
@@ -198,3 +199,34 @@ def test_a_wrong_option_is_one_line(text, hint):
         name, table = parse_roll_out(text)
         read_study(options=[option("rollouts", {name: table})])
     assert "\n" not in str(refused.value)
+
+
+# --- scenes that a roll-out brings itself --------------------------------------------------------------
+
+STANDING = np.array(
+    [[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [0.2, 0.0, 0.3], [0.2, 1.7, 0.1]]
+)  # [m], head last
+TETRAHEDRON = np.array([[0, 1, 2], [0, 3, 1], [1, 3, 2], [2, 3, 0]])
+
+
+def declare(folder: Path, rest_scale: float):
+    """The scene of a sheet that stays where it starts, beside a body that stands there."""
+    positions = np.repeat(SCENE.start[None], SCENE.frames, axis=0)
+    obstacle = np.repeat(STANDING[None], SCENE.frames, axis=0)
+    np.savez(
+        folder / "pred.npz", positions=positions, faces=FACES, obstacle=obstacle,
+        obstacle_faces=TETRAHEDRON,
+    )  # fmt: skip
+    write_obj(folder / "rest.obj", rest_scale * SCENE.cloth.rest_positions, FACES)
+    option = RollOutOption("pred", str(folder / "pred.npz"))
+    return declared(option, str(folder / "rest.obj"))
+
+
+@pytest.mark.parametrize("rest_scale", [100.0, 0.01])
+def test_a_rest_mesh_in_another_unit_is_refused(rest_scale, tmp_path):
+    message = r"rest\.obj: .*pred\.npz .*one unit and order of vertices"
+    with pytest.raises(RollOutFileError, match=message) as refused:
+        declare(tmp_path, rest_scale).build()
+    assert "\n" not in str(refused.value)
+    for scale in (1.0, 0.5, 2.0):  # cloth may start stretched, or on a mesh that was scaled a little
+        assert declare(tmp_path, scale).build().frames == SCENE.frames

@@ -10,12 +10,11 @@ import torch
 
 from benchmarks.assets import open_assets
 from benchmarks.methods.lower_bounds import ClipInertia, DirectOptimisation
-from benchmarks.methods.simulation import Simulation
 from benchmarks.metrics.energy import energy_series
 from benchmarks.presets import find_preset
 from reference_sim.cloth import Cloth
 from reference_sim.energies import ContactPenalty, Inertia
-from tests.benchmarks.runner.tasks_by_hand import dressed_scene
+from tests.benchmarks.runner.tasks_by_hand import dressed_scene, prepared
 from tests.snug.training.dressing import swaying, tube_dress
 
 FRAMES = 6
@@ -70,9 +69,8 @@ def test_the_sum_is_that_of_the_energy_metric(scene, bound):
 
 
 def test_the_bound_is_far_below_skinning_and_below_a_simulation(scene, bound):
-    (_, trajectory), simulation = bound, Simulation()
-    simulation.prepare(scene)
-    clips = (trajectory.positions, simulation.run().positions, scene.skinned)
+    _, trajectory = bound
+    clips = (trajectory.positions, prepared("simulation", scene).run().positions, scene.skinned)
     free, reference, start = (s["total"].sum() for s in energy_series(scene, clips))
     assert trajectory.status == "ok" and trajectory.positions.shape == scene.skinned.shape
     assert free < reference < start

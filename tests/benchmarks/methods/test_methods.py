@@ -13,7 +13,6 @@ from benchmarks.assets import embedded_motions, open_assets
 from benchmarks.method import Method
 from benchmarks.methods import find_method
 from benchmarks.methods.declared_solvers import SOLVERS
-from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics import energy_gap
 from benchmarks.metrics.dynamics import shares_quasi_static
 from benchmarks.plan.cell import Cell
@@ -29,7 +28,14 @@ from benchmarks.runner.rows import rows_of
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.scenes import SCENES
 from reference_sim import Trajectory
-from tests.benchmarks.runner.tasks_by_hand import InProcess, dressed_scene, plan_of, small_scene
+from tests.benchmarks.runner.tasks_by_hand import (
+    InProcess,
+    dressed_scene,
+    grouped,
+    plan_of,
+    prepared,
+    small_scene,
+)
 
 SIZES = {"frames": 16, "settle_frames": 2, "sheet_cells": 4, "sheet_frames": 5, "gap_samples": 2}
 SIZES["least_seconds"] = 0.01
@@ -188,8 +194,7 @@ def test_a_run_that_is_done_again_gives_the_same_and_inputs_are_what_it_takes_as
     plan, _, executor = run
     scene = scenes[BODY]
     cell = next(cell for cell in plan.cells if (cell.scene.name, cell.method) == (BODY, name))
-    method = cell.entry.make(models=executor.folder.models_of(cell.scene.garment), seed=0)
-    method.prepare(scene)
+    method = prepared(cell.entry, scene, executor.folder.models_of(cell.scene.garment))
     first, again = method.run().positions, method.run().positions
     assert np.array_equal(first, again) and np.array_equal(
         first, trajectory_of(run, BODY, name).positions
@@ -232,17 +237,13 @@ def test_a_roll_out_that_is_lost_is_measured_up_to_there_and_ends_no_other_ones_
         "newton-4": (0, np.inf),
         "newton-8": (4, 1e200),
     }
-    group = SceneRollOuts(scene, gap_samples=3)
+    spoilt = {}
     for method, (first, value) in lost.items():
-        x = falling.copy()
-        x[first:] = value
-        trajectory = Trajectory(
-            positions=x, faces=scene.cloth.faces, times=scene.dt * np.arange(len(x)),
-            frame_seconds=np.full(len(x), 1e-3), status="ok",
-        )  # fmt: skip
-        status = "ok" if first > len(x) else "diverged"
-        entry = find_method(method)
-        group.roll_outs.append(RollOut(group, entry, trajectory, status=status, suites=("speed",)))
+        spoilt[method] = falling.copy()
+        spoilt[method][first:] = value
+    group = grouped(scene, spoilt, suites=("speed",))
+    for roll_out in group.roll_outs[1:]:
+        roll_out.status = "diverged"
     with np.errstate(all="ignore"):
         metrics, curves, _ = zip(*(measured(roll_out) for roll_out in group.roll_outs))
     metrics, curves = dict(zip(lost, metrics)), dict(zip(lost, curves))

@@ -9,13 +9,12 @@ import numpy as np
 import pytest
 
 from benchmarks.method import Method
-from benchmarks.methods import find_method
 from benchmarks.methods.simulation import Simulation
 from benchmarks.methods.warm_started import WarmStarted
 from reference_sim import cholesky, potential, simulate
 from reference_sim.minimise import factorised, lbfgs
 from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS
-from tests.benchmarks.runner.tasks_by_hand import small_scene
+from tests.benchmarks.runner.tasks_by_hand import prepared, small_scene
 
 SOLVERS = (
     "simulation", "simulation-dt/2", "simulation-refrozen", "newton-2", "lbfgs-10", "fast-lbfgs-10", "vbd-20",
@@ -52,8 +51,7 @@ def assert_sets_nothing_up(method: Method, monkeypatch) -> None:
 @pytest.mark.parametrize("name", SOLVERS)
 def test_a_run_sets_nothing_up_and_all_runs_give_the_bits_of_a_new_simulation(name, monkeypatch):
     scene = small_scene("sheet_on_sphere", cells=6, frames=6)
-    method = find_method(name).make(models=None, seed=0)
-    method.prepare(scene)
+    method = prepared(name, scene)
     assert_sets_nothing_up(method, monkeypatch)
     runs = [method.run().positions for _ in range(2)]
     assert np.array_equal(*runs) and np.array_equal(runs[0], simulated_anew(method))

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import torch
 
-from benchmarks.methods import find_method
 from benchmarks.metrics.energy import copied_terms, freeze_step
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import model_path
@@ -20,7 +19,7 @@ from snug.networks.garment_network import make_network
 from snug.networks.handles import shape_functions, span
 from snug.networks.trained_model import TrainedModel
 from snug.recipe import DEFAULT
-from tests.benchmarks.runner.tasks_by_hand import assets_of, dressed_scene
+from tests.benchmarks.runner.tasks_by_hand import assets_of, dressed_scene, prepared
 from tests.snug.training.dressing import swaying, tube_dress
 
 FRAMES = 5
@@ -33,15 +32,9 @@ def scene():
     return dressed_scene(motion.name, preset=preset).build(assets_of(tube_dress(), motion))
 
 
-def simulated(scene, name: str, models=None):
-    method = find_method(name).make(models=models, seed=0)
-    method.prepare(scene)
-    return method.run()
-
-
 @pytest.fixture(scope="module")
 def floor(scene):
-    return simulated(scene, "handles-20-floor")
+    return prepared("handles-20-floor", scene).run()
 
 
 def unposed(scene, positions) -> np.ndarray:
@@ -59,13 +52,12 @@ def left_over(columns: np.ndarray, offsets: np.ndarray) -> float:
     return float(np.abs(columns @ np.linalg.lstsq(columns, offsets.T)[0] - offsets.T).max())
 
 
-def test_a_floor_can_be_stored(floor, tmp_path):
+def test_every_step_is_a_minimum_within_the_handles_and_above_that_of_all_vertices(
+    scene, floor, tmp_path
+):
+    assert floor.status == "converged" and floor.frame_fields["converged"].all()
     floor.save(tmp_path / "floor.vtkhdf")
     assert Trajectory.load(tmp_path / "floor.vtkhdf").provenance["options"]["method"] == "in_subspace"
-
-
-def test_every_step_is_a_minimum_within_the_handles_and_above_that_of_all_vertices(scene, floor):
-    assert floor.status == "converged" and floor.frame_fields["converged"].all()
     columns = span(shape_functions(scene.dressed.garment, 20))
     offsets = unposed(scene, floor.positions)
     assert left_over(columns, offsets) < 1e-8 and np.abs(offsets).max() > 0.01
@@ -94,14 +86,14 @@ def test_every_step_is_a_minimum_within_the_handles_and_above_that_of_all_vertic
 
 
 def test_more_handles_have_less_energy(scene, floor):
-    finer = simulated(scene, "handles-40-floor")
+    finer = prepared("handles-40-floor", scene).run()
     assert finer.status == "converged"
 
     def energy(trajectory):
         parts = [v for name, v in trajectory.frame_fields.items() if name.startswith("energy/")]
         return float(np.sum(parts, axis=0)[2:].mean())
 
-    assert energy(simulated(scene, "simulation")) < energy(finer) < energy(floor)
+    assert energy(prepared("simulation", scene).run()) < energy(finer) < energy(floor)
 
 
 def test_the_floor_of_a_network_lies_in_the_span_of_its_last_layer(scene, tmp_path):
@@ -110,7 +102,7 @@ def test_the_floor_of_a_network_lies_in_the_span_of_its_last_layer(scene, tmp_pa
         "pbns", 141, vertices, dataclasses.replace(DEFAULT, zero_last_layer=False), seed=0
     )
     TrainedModel("pbns", network, DEFAULT).save(model_path(tmp_path, "pbns", 0))
-    floor = simulated(scene, "pbns-floor", tmp_path)
+    floor = prepared("pbns-floor", scene, tmp_path).run()
     assert floor.status == "converged"
     columns, _ = network.offset_space()
     assert left_over(columns.double().numpy(), unposed(scene, floor.positions)) < 1e-6

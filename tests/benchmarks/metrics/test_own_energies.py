@@ -24,7 +24,7 @@ from benchmarks.presets import find_preset
 from snug.kinds import KINDS
 from snug.named_recipes import PAPER
 from tests.benchmarks.plan.planned import planned
-from tests.benchmarks.runner.tasks_by_hand import dressed_scene, grouped
+from tests.benchmarks.runner.tasks_by_hand import dressed_scene, grouped, prepared
 
 MOTION = "arm_raise"
 
@@ -41,12 +41,11 @@ def scene():
 @pytest.fixture(scope="module")
 def simulations(scene):
     """Name -> positions of the reference, "at rest" its quasi-static twin, and of own references."""
-    methods = {name: find_method(name) for name in ("simulation", *(e.name for e in OWN_REFERENCES))}
-    made = {name: entry.make(models=None, seed=0) for name, entry in methods.items()}
-    found = {}
-    for name, method in (made | {"at rest": Simulation(AT_REST)}).items():
-        method.prepare(scene)
-        found[name] = method.run().positions
+    names = ("simulation", *(entry.name for entry in OWN_REFERENCES))
+    found = {name: prepared(name, scene).run().positions for name in names}
+    at_rest = Simulation(AT_REST)
+    at_rest.prepare(scene)
+    found["at rest"] = at_rest.run().positions
     return found
 
 
@@ -80,9 +79,7 @@ def test_the_minimiser_of_its_own_energies_leaves_a_network_no_excess(scene, sim
 
 def test_simulations_have_the_constants_that_are_trained_on(scene):
     def terms(name):
-        method = find_method(f"simulation-{name}").make(models=None, seed=0)
-        method.prepare(scene)
-        return {term.name: term for term in method.scene.energies}
+        return {term.name: term for term in prepared(f"simulation-{name}", scene).scene.energies}
 
     contact = terms("paper")["collision"]
     assert (contact.margin, contact.samples) == (0.002, "vertices")

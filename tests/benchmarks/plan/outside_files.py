@@ -14,25 +14,26 @@ from tests.benchmarks.test_provenance import forget
 TINY = dataclasses.replace(find_preset("smoke"), sheet_cells=3, sheet_frames=6)
 SCENE = {scene.name: scene for scene in SCENES}
 
-METHOD = """
-import numpy as np
+METHOD = """import numpy as np
 from benchmarks import Method, MethodEntry
 from reference_sim import Trajectory
-from {helper} import place
 
-METHODS = (MethodEntry(name="{name}", label="{label}", description="exact", role="solver", files=("a.txt",)),)
+METHODS = (MethodEntry(name="still", description="a method", role="solver"),)
 
-class Exact(Method):
+class Still(Method):
     def prepare(self, scene):
         self.scene = scene
 
     def run(self):
         scene = self.scene
-        positions = np.stack([place(scene, frame) for frame in range(scene.frames)])
-        return Trajectory(positions, scene.cloth.faces, np.arange(scene.frames) * scene.dt)
+        x = np.repeat(np.array(scene.start)[None], scene.frames, axis=0)
+        pass
+        return Trajectory(x, scene.cloth.faces, np.arange(len(x)) * scene.dt)
 
 def make(*, models, seed):
-    return Exact()
+    method = Still()
+    method.seed = seed
+    return method
 """
 HELPER = "def place(scene, frame):\n    return scene.exact[frame] + {shift}\n"
 SCENE_FILE = """
@@ -95,6 +96,13 @@ from benchmarks.methods.outside import program
 SCRIPT = Path(__file__).with_name("theirs_run.py")
 METHODS = (program("theirs", f"{sys.executable} -I {SCRIPT} {{scene}} {{out}}", files=("theirs_run.py",)),)
 """
+
+
+def method_by(helper: str, name: str) -> str:
+    """Return the text of a method that reads a.txt and puts its vertices where a module beside it says."""
+    text = METHOD.replace("import numpy as np", f"import numpy as np\nfrom {helper} import place")
+    text = text.replace('"still"', f'"{name}"').replace('"solver"', '"solver", files=("a.txt",)')
+    return text.replace("pass", "x = np.stack([place(scene, frame) for frame in range(scene.frames)])")
 
 
 def as_before():

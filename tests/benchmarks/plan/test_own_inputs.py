@@ -15,12 +15,19 @@ from benchmarks.runner.schedule import Schedule
 from reference_sim.material import Material
 from snug.body.parametric_body import Body
 from snug.garments.templates import find_template
-from tests.benchmarks.assets.test_inputs import write_motions
 from tests.benchmarks.plan.planned import planned
 from tests.snug.garments.garment_files import own_chart, saved
 from tests.snug.training.dressing import tube_dress
 
 WORDS = ("smoke:garments", "--methods", "skinning")
+
+
+def write_motions(folder: Path, *names: str, frames: int = 12) -> str:
+    folder.mkdir(exist_ok=True)
+    for name in names:
+        poses = np.zeros((frames, 52 * 3))
+        np.savez(folder / f"{name}.npz", poses=poses, trans=np.zeros((frames, 3)), mocap_framerate=30.0)
+    return str(folder)
 
 
 @pytest.fixture(scope="module")

@@ -35,6 +35,8 @@ WORDS = [
     ("--scenes tshirt/walk", "see test_motions"),
     ("--methods sung", "did you mean snug"),
     ("--motions broken.npz", "broken.npz"),
+    ("--motions short.npz", "2 frames; at least 3 are needed"),
+    ("--motions walk.npz", "the name 'walk' is taken; rename the file"),
     ("--motions back.npz,up=z", "stands along z in 0 % of the frames only"),
     ("--out full", "holds no run"),
     ("--out torn", "torn/run.json: not readable"),
@@ -65,6 +67,7 @@ METHOD_FILES = [
     (entry(PLAIN + ', files=("gone.pt",)'), "gone.pt: no such file"),
     (entry(PLAIN + ', options={"at": open}'), "method 'a': cannot tell"),
     (entry(PLAIN + ', trained="zz"'), "no training is called 'zz'"),
+    (entry(PLAIN + ', role="solvr"'), "unknown role 'solvr'; use one of reference, "),
     (entry('name="a b", description="c"'), "method 'a b': name it by at most 150 letters"),
     (entry('name="snug", description="c"'), "method 'snug' is declared twice, by the project itself and by "),
     (HEAD + "METHODS = tuple(MethodEntry(name=n, description='b') for n in ('a/b', 'a-b'))\n" + MAKE,
@@ -90,7 +93,9 @@ def folder(tmp_path, monkeypatch):
     for name, text in texts.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).write_text(text)
-    np.savez(tmp_path / "back.npz", poses=np.zeros((3, 72)), trans=np.zeros((3, 3)), fps=30)
+    for name, frames in (("back", 3), ("walk", 3), ("short", 2)):
+        still = {"poses": np.zeros((frames, 72)), "trans": np.zeros((frames, 3)), "fps": 30}
+        np.savez(tmp_path / f"{name}.npz", **still)
     monkeypatch.chdir(tmp_path)
     begun = "benchmarks.runner.execute_plan.execute"
     monkeypatch.setattr(begun, lambda *_, **__: pytest.fail("the run was begun"))

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks import run
 from benchmarks.plan.study import located, parse_setting, read_study, study_names
 from benchmarks.presets import find_preset
 from benchmarks.publish import published_studies
@@ -84,6 +85,14 @@ def test_every_study_of_the_package_has_a_question_and_can_be_planned(name):
     assert plan.study.written["name"] == name
     cells = [cell for cell in plan.cells if cell.entry.skip(cell.scene) is None]
     assert {cell.scene.name for cell in cells} == {scene.name for scene in plan.scenes}
+
+
+def test_the_list_has_the_scenes_that_the_study_measures(capsys):
+    assert run.main(["--list", "smoke:speed"]) == 0
+    measured = capsys.readouterr().out.partition("where none is named")[2].partition("\n\n")[0]
+    names = measured.splitlines()[1].split("speed", 1)[1].strip().split(", ")
+    assert names == [scene.name for scene in planned("smoke:speed").scenes]
+    assert len(measured.splitlines()) == 2
 
 
 def test_published_pictures_are_those_that_reports_draw():

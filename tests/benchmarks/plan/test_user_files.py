@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import sys
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
+from io import StringIO
 from pathlib import Path
 
 import pytest
@@ -17,10 +18,10 @@ from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule
+from reference_sim.files.array_file import read_arrays
 from snug.recipe import DEFAULT, RecipeError
 from tests.benchmarks.plan.outside_files import (
     HELPER,
-    METHOD,
     METRIC_FILE,
     PROGRAM,
     PROGRAM_FILE,
@@ -28,6 +29,7 @@ from tests.benchmarks.plan.outside_files import (
     SCENE_FILE,
     TINY,
     as_before,
+    method_by,
 )
 from tests.benchmarks.runner.tasks_by_hand import dressed_scene, plan_of
 from tests.benchmarks.test_provenance import forget
@@ -40,22 +42,26 @@ def files(tmp_path_factory) -> Path:
     """A user's folder."""
     folder = tmp_path_factory.mktemp("user")
     (folder / "a.txt").write_text("weights")
-    (folder / "mine.py").write_text(METHOD.format(helper="mine_helper", name="mine", label="Mine"))
+    (folder / "mine.py").write_text(method_by("mine_helper", "mine"))
     (folder / "mine_helper.py").write_text(HELPER.format(shift=0.0))
     (folder / "lift.py").write_text(SCENE_FILE)
     (folder / "height.py").write_text(METRIC_FILE)
     (folder / "theirs.py").write_text(PROGRAM_FILE)
     (folder / "theirs_run.py").write_text(PROGRAM)
     (other := folder / "other").mkdir()
-    other_method = METHOD.format(helper="other_helper", name="other-1", label="Other")
-    (other / "other_method.py").write_text(other_method)
+    (other / "other_method.py").write_text(method_by("other_helper", "other-1"))
     (other / "other_helper.py").write_text(HELPER.format(shift=0.001))
+    (other / "broken.py").write_text(method_by("broken_helper", "broken"))
+    (other / "broken_helper.py").write_text(
+        "def place(*_):\n    raise RuntimeError('broken on\\npurpose')\n"
+    )
     (other / "a.txt").write_text("weights")
     return folder
 
 
 WORDS = ["smoke:speed", "--scenes", "lift.py", "--set", "metrics=height.py"]
-WORDS += ["--methods", "simulation,./mine.py,other/other_method.py,theirs.py", "-o", "out"]
+METHODS = "simulation,skinning,./mine.py,other/other_method.py,other/broken.py,theirs.py"
+WORDS += ["--methods", METHODS, "-o", "out"]
 
 
 def command(files: Path, *more: str) -> int:
@@ -66,15 +72,32 @@ def command(files: Path, *more: str) -> int:
 
 @pytest.fixture(scope="module")
 def done(files) -> RunFolder:
-    with contextmanager(as_before)():
-        assert command(files) == 0
+    with contextmanager(as_before)(), redirect_stdout(StringIO()) as shown:
+        assert command(files) == 1  # one of the methods is broken
+    assert shown.getvalue().splitlines()[-1] == str((files / "out" / "report.pdf").resolve())
     return RunFolder(files / "out")
+
+
+def test_a_failed_cell_is_a_row_and_the_rest_goes_on(done):
+    ended = {
+        row.method: (row.status, row.reason) for row in done.read_rows() if row.metric == "cost/frame"
+    }
+    assert ended["broken"] == ("failed", "RuntimeError: broken on purpose")
+    assert ended["skinning"][0] == "skipped" and "no body" in ended["skinning"][1]
+    assert ended["simulation"] == ended["mine"] == ("ok", "")
+    config = done.read_config()
+    assert config["finished"] and config["commit"] and config["versions"]["numpy"]
+    assert {stage["name"] for stage in config["stages"]} >= {"cells", "metrics"}
+    assert (done.path / "report.pdf").stat().st_size > 1000
+    curves = read_arrays(done.curves_path("lift", "simulation"))
+    assert {"energy/lift", "energy/inertia", "energy/total"} <= set(curves)
+    assert not [path for path in done.path.rglob("*") if "part" in path.name]
 
 
 def test_entries_of_files_and_as_a_program_are_rows_like_others(done):
     rows = {(row.method, row.metric): row for row in done.read_rows()}
     assert {row.scene for row in rows.values()} == {"lift"}
-    off = {method: rows[method, "exact/distance"].value for method, _ in rows}
+    off = {method: row.value for (method, metric), row in rows.items() if metric == "exact/distance"}
     assert max(off["simulation"], off["mine"], off["theirs"]) < 1e-9 and len(off) == 4
     assert off["other-1"] == pytest.approx(0.001 * 3**0.5)
     assert all((method, "energy/lift") in rows and (method, "height/highest") in rows for method in off)
@@ -95,7 +118,7 @@ def test_what_is_unchanged_is_cached_and_what_is_edited_is_done_again(done, file
         forget()
         assert command(files, "--dry-run") == 0
         lines = [line for line in capsys.readouterr().out.splitlines() if line.startswith("  cell")]
-        return {line.split(":")[0].split()[-1] for line in lines if not line.endswith(": cached")}
+        return {line.split(":")[0].split()[-1] for line in lines if ": cached" not in line}
 
     assert stale() == set()
     (files / "theirs_run.py").write_text(PROGRAM + "# every byte counts\n")
@@ -105,7 +128,8 @@ def test_what_is_unchanged_is_cached_and_what_is_edited_is_done_again(done, file
     assert stale() == {"mine"}
     (files / "a.txt").write_text("weights")
     (files / "mine_helper.py").write_text(HELPER.format(shift=0.5))
-    assert stale() == {"simulation", "mine", "theirs", "other-1"}  # it lies beside the scene's file too
+    beside = {"simulation", "mine", "theirs", "other-1", "broken"}
+    assert stale() == beside  # the helper lies beside the scene's file too
 
 
 ANSWERS = """

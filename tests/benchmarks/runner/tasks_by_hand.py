@@ -59,20 +59,18 @@ def assets_of(dressed, motion) -> Assets:
     return Assets(dressed.body, {"tshirt": dressed.garment}, {motion.name: motion}, {})
 
 
-def training(
-    name: str, *motions: str, steps: int, key: str = "0", device: str = "cpu"
-) -> NetworkTraining:
+def training(name: str, *motions: str, steps: int, key: str = "0") -> NetworkTraining:
     """The training of a network of the T-shirt."""
     simulated = name in TRAININGS and TRAININGS[name].simulated
     return NetworkTraining(
-        network=Network(name, 0, "tshirt"), steps=steps, motions=motions, device=device,
+        network=Network(name, 0, "tshirt"), steps=steps, motions=motions, device="cpu",
         inputs={"key": key}, key=key, reads=tuple(("data", m) for m in motions if simulated),
     )  # fmt: skip
 
 
-def context(folder, assets: Assets | None = None, **fields) -> Context:
+def context(folder, assets: Assets | None = None) -> Context:
     """Return the context of a process in which a task runs."""
-    return Context(RunFolder(folder), assets, **fields)
+    return Context(RunFolder(folder), assets)
 
 
 def plan_of(folder: Path, *names: str, scene: str = "free_fall", how: str = "", **changes) -> Plan:
@@ -114,12 +112,17 @@ def prepared(method: str | MethodEntry, scene: BuiltScene, models: Path = Path()
     return made
 
 
+def trajectory_of(scene: BuiltScene, positions: np.ndarray, **fields) -> Trajectory:
+    """Return positions (T,V,3) [m] as a roll-out in this scene."""
+    times = np.arange(len(positions)) * scene.dt
+    return Trajectory(positions, scene.cloth.faces, times, **fields)
+
+
 def grouped(scene: BuiltScene, positions: dict[str, np.ndarray], **fields) -> SceneRollOuts:
     """Roll-outs of methods, by name, measured together; fields are those of each roll-out."""
     group = SceneRollOuts(scene, gap_samples=99)
     for name, x in positions.items():
-        trajectory = Trajectory(x, scene.cloth.faces, np.arange(len(x)) * scene.dt)
-        group.roll_outs.append(RollOut(group, find_method(name), trajectory, **fields))
+        group.roll_outs.append(RollOut(group, find_method(name), trajectory_of(scene, x), **fields))
     return group
 
 

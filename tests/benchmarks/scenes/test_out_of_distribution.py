@@ -10,7 +10,7 @@ import pytest
 from benchmarks.assets import Assets
 from benchmarks.methods import find_method
 from benchmarks.methods.networks import CollisionPostProcessing
-from benchmarks.metric import RollOut, SceneRollOuts
+from benchmarks.metric import RollOut
 from benchmarks.metrics.roll_out import EXTRAPOLATION, measure_extrapolation
 from benchmarks.plan.cell import Cell
 from benchmarks.presets import find_preset
@@ -20,25 +20,23 @@ from benchmarks.runner.rows import rows_of_cell
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.runner.task import Outcome
 from benchmarks.scenes import ORDINARY, find_scene, hard_motions
-from reference_sim import Trajectory
 from snug.body.parametric_body import Body
 from snug.body.skeleton import JOINT, joint_positions, rotation_matrices
-from snug.garments.templates import find_template
 from snug.motion.library import make_motion
 from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
 from snug.training.train_network import untrained_model
 from tests.benchmarks.plan.planned import planned
-from tests.benchmarks.runner.tasks_by_hand import plan_of
+from tests.benchmarks.runner.tasks_by_hand import grouped, plan_of, prepared, trajectory_of
+from tests.snug.training.dressing import tailored
 
 SMOKE = find_preset("smoke")
 
 
 @pytest.fixture(scope="module")
 def assets():
-    body = Body.load()
-    return Assets(body, {"tshirt": find_template("tshirt").tailor(body, vertices=200)}, {}, {})
+    return Assets(Body.load(), {"tshirt": tailored("tshirt", 200)}, {}, {})
 
 
 @pytest.fixture(scope="module")
@@ -53,8 +51,7 @@ def models(assets, tmp_path_factory):
 def rolled_out(assets, models, name, method):
     """The built scene, and the method that has rolled out in it."""
     scene = find_scene(name).at(SMOKE).build(assets)
-    made = find_method(method).make(models=models, seed=0)
-    made.prepare(scene)
+    made = prepared(method, scene, models)
     return scene, made, made.run().positions
 
 
@@ -83,25 +80,21 @@ def test_what_is_hard_about_each(assets):
     assert wrists[0] < -0.1  # the left one is on the right
 
 
-def trajectory_of(scene, positions):
-    return Trajectory(positions, scene.cloth.faces, np.arange(len(positions)) * scene.dt)
-
-
 @pytest.fixture(scope="module")
 def roll_outs(assets, models):
     """Name of a scene -> roll-outs of skinning and of an untrained network there."""
 
     run = cache(partial(rolled_out, assets, models))
 
-    def made(name):
-        group = SceneRollOuts(run(name, "skinning")[0])
-        for method in ("skinning", "snug"):
-            trajectory = trajectory_of(group.scene, run(name, method)[2])
-            group.roll_outs.append(RollOut(group, find_method(method), trajectory, suites=("extremes",)))
-            group.roll_outs[-1].counterpart = run(ORDINARY, method)[2]
-        return {roll_out.entry.name: roll_out for roll_out in group.roll_outs}
+    def both(name):
+        positions = {method: run(name, method)[2] for method in ("skinning", "snug")}
+        group = grouped(run(name, "skinning")[0], positions, suites=("extremes",))
+        made = dict(zip(positions, group.roll_outs))
+        for method, rolled in made.items():
+            rolled.counterpart = run(ORDINARY, method)[2]
+        return made
 
-    return made
+    return both
 
 
 def test_a_glitch_is_forgotten_or_not(roll_outs):

@@ -3,34 +3,37 @@
 from __future__ import annotations
 
 import dataclasses
+import os
+import pickle
+import subprocess
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from benchmarks.assets import embedded_motions, joint_speeds, liveliest_part, open_assets
+from benchmarks.assets import (
+    Assets,
+    embedded_motions,
+    joint_speeds,
+    liveliest_part,
+    open_assets,
+    read_inputs,
+)
 from benchmarks.presets import find_preset
 from benchmarks.runner.cache import dependencies
 from benchmarks.runner.schedule import tasks_of
-from benchmarks.scenes import SCENES, all_scenes, shapes
+from benchmarks.scenes import all_scenes, shapes
 from reference_sim import simulate
 from snug.body.parametric_body import Body
-from snug.motion.library import make_motion
-from tests.benchmarks.assets.test_inputs import write_body
+from snug.motion.library import CLIPS, SEGMENTS, make_motion
 from tests.benchmarks.plan.planned import planned
-from tests.benchmarks.runner.tasks_by_hand import dressed_scene
+from tests.benchmarks.runner.tasks_by_hand import dressed_scene, prepared
+from tests.snug.training.dressing import tailored
 
 SMOKE = find_preset("smoke")
 TINY = dataclasses.replace(SMOKE, garment_vertices=300, frames=8)
-
-
-@pytest.mark.parametrize("scene", SCENES, ids=lambda scene: scene.name)
-def test_small_scenes_build_alike_twice_and_declare_their_terms(scene):
-    first, second = scene.at(SMOKE).build(), scene.at(SMOKE).build()
-    assert np.array_equal(first.start, second.start) and first.frames == SMOKE.sheet_frames
-    assert first.terms[-1] == "inertia" and len(set(first.terms)) == len(first.terms)
-    assert (first.obstacle is not None) == ("collision" in first.terms)
-    assert first.dressed is None
 
 
 def test_a_body_of_another_shape_wears_the_garment_of_the_mean_one(monkeypatch):
@@ -63,8 +66,19 @@ def test_a_body_of_another_shape_wears_the_garment_of_the_mean_one(monkeypatch):
     assert apart == pytest.approx(np.linalg.norm(wanted, axis=2).min(1), abs=1e-9)
 
 
+def write_body(path: Path, scale: float) -> str:
+    body = Body.load()
+    arrays = {"v_template": body.template, "J_template": body.joint_template}
+    table = np.stack([np.maximum(body.parents, 0), np.arange(24)])
+    scaled = {name: scale * array for name, array in arrays.items()}
+    np.savez(path, f=body.faces, weights=body.skinning_weights, kintree_table=table, **scaled)
+    return str(path)
+
+
 def test_an_own_body_wears_the_garment_and_makes_stale_what_was_on_another(tmp_path):
-    path = write_body(tmp_path / "tall.npz", 1.1)
+    path, again = (write_body(tmp_path / f"{name}.npz", 1.1) for name in ("tall", "again"))
+    same, other = (read_inputs(body=Path(file)).body.digest for file in (path, again))
+    assert same == other  # what was read is known again, not its file
     plans = [planned("full:garments", "--methods", "snug", *more) for more in ((), ("--body", path))]
     for one, other in zip(*map(tasks_of, plans)):
         assert one.kind not in ("network", "cell") or dependencies(one, {}) != dependencies(other, {}), (
@@ -111,3 +125,46 @@ def test_a_clip_goes_on_where_the_whole_motion_is():
     joined = before.followed_by(motion)
     assert np.array_equal(joined.poses, assets.motions["sudden_stop"].poses[: frames.stop])
     assert built[0].dressed.before is None
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", [*CLIPS, *SEGMENTS])
+def test_the_reference_converges_on_every_frame_of_a_recorded_clip(name):
+    motion = make_motion(name)
+    assets = Assets(Body.load(), {"tshirt": tailored("tshirt", 1000)}, {name: motion}, {})
+    scene = dressed_scene(name, preset=find_preset("quick")).build(assets)
+    trajectory = prepared("simulation", scene).run()
+    assert trajectory.frames == motion.frames
+    assert np.flatnonzero(trajectory.frame_fields["converged"] < 1).tolist() == []
+
+
+ROOT = Path(__file__).resolve().parents[3]
+DRESSED = """
+import dataclasses, pickle, sys
+from pathlib import Path
+from benchmarks.methods import find_method
+from benchmarks.presets import find_preset
+from benchmarks.scenes import of_garment
+assets, body, start, motion = pickle.loads(Path(sys.argv[1]).read_bytes())
+assets = dataclasses.replace(assets, motions={"kick": motion}, bodies={"kick": body})
+scene = of_garment("tshirt").scene("kick").at(find_preset("smoke")).build(assets)
+method = find_method("lbfgs-5").make(models=Path("."), seed=0)
+method.prepare(dataclasses.replace(scene, settle=lambda: start))
+assert method.run().frames == 4
+print(*sys.modules)
+"""
+NETWORKS = {"torch", "snug.body.skinning", "snug.networks.dressed_body", "snug.networks.regressor"}
+
+
+def test_solvers_of_a_dressed_body_load_no_network_library(tmp_path):
+    """Whoever poses the joints needs torch; a cell is given the posed body."""
+    assets = open_assets(SMOKE, embedded_motions(["kick"]), ["tshirt"])
+    scene = dressed_scene("kick").build(assets)
+    motion, path = assets.motions["kick"], tmp_path / "given"
+    given = (assets, assets.posed_body(motion)[:4], scene.start, motion.cut(0, 4))
+    path.write_bytes(pickle.dumps(given))
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    modules = subprocess.check_output(
+        [sys.executable, "-c", DRESSED, str(path)], text=True, env=environment
+    )
+    assert "reference_sim.obstacle" in modules.split() and not NETWORKS & {*modules.split()}

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from benchmarks.meshes import sphere
-from benchmarks.methods import find_method
 from benchmarks.methods.simulation import Simulation
 from benchmarks.plan.plan import make_plan, protocol_of
 from benchmarks.plan.study import StudyError
@@ -19,7 +18,7 @@ from reference_sim import Cloth, Material, Obstacle
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
 from tests.benchmarks.methods.test_prepared_solvers import simulated_anew
 from tests.benchmarks.plan.planned import study_with
-from tests.benchmarks.runner.tasks_by_hand import small_scene
+from tests.benchmarks.runner.tasks_by_hand import prepared, small_scene
 from tests.reference_sim.meshes import grid
 
 pytest.importorskip("ipctk", reason="ipctk is not installed: no self-contact")
@@ -50,8 +49,7 @@ def test_solvers_that_stop_early_know_no_self_contact_and_the_last_runs_pairs_ar
     stopped = Simulation(options={"max_iterations": 2, "method": "newton"})
     stopped.prepare(pressed_together)
     assert "energy/barrier" not in stopped.run().frame_fields
-    method = Simulation(options={})
-    method.prepare(pressed_together)
+    method = prepared("simulation", pressed_together)
     first = method.run()
     assert first.status == "converged" and first.frame_fields["energy/barrier"][-1] > 0.0
     assert np.array_equal(first.positions, method.run().positions)
@@ -62,8 +60,7 @@ def test_solvers_that_stop_early_know_no_self_contact_and_the_last_runs_pairs_ar
 def test_another_material_is_minimised_beside_the_barrier(exchange, pressed_together):
     points, faces = sphere(0.1, 4)
     scene = dataclasses.replace(pressed_together, obstacle=Obstacle(points - 1.0, faces))  # out of reach
-    other = find_method(f"simulation-{exchange}").make(models=None, seed=0)
-    other.prepare(scene)
+    other = prepared(f"simulation-{exchange}", scene)
     minimised = {term.name: term for term in other.stepper.potential.energies}
     assert minimised["barrier"] is scene.minimised[-1]
     for declared, theirs in zip(scene.energies, other.scene.energies):

@@ -1,4 +1,4 @@
-"""Known answers: every case passes, and a number is judged as it should be."""
+"""Cases: known answers are found, stress tests end honestly, and a number is judged as it should be."""
 
 from __future__ import annotations
 
@@ -7,26 +7,22 @@ import math
 import pytest
 
 from benchmarks.validation.case import Case
-from benchmarks.validation.registry import KNOWN_ANSWERS
+from benchmarks.validation.registry import KNOWN_ANSWERS, STRESS_TESTS
 from tests.benchmarks.plan.planned import planned
 
+CASES = [
+    pytest.param(case, id=case.name, marks=[] if case.smoke else [pytest.mark.slow])
+    for case in (*KNOWN_ANSWERS, *STRESS_TESTS)
+]
 
-@pytest.mark.parametrize(
-    "case",
-    [
-        pytest.param(case, id=case.name, marks=[] if case.smoke else [pytest.mark.slow])
-        for case in KNOWN_ANSWERS
-    ],
-)
-def test_a_known_answer_is_found(case):
-    row = case.run()
-    assert row.status == "ok", row.reason
-    assert (row.suite, row.scene, row.method, row.metric) == (
-        "validation",
-        case.name,
-        "simulation",
-        "check",
-    )
+
+@pytest.mark.parametrize("case", CASES)
+def test_a_known_answer_is_found_and_a_stress_test_never_lies(case):
+    row, known = case.run(), case in KNOWN_ANSWERS
+    honest = ("ok",) if known or case.smoke else ("ok", "stalled", "timeout", "diverged")
+    assert row.status in honest and (known or row.reason), row.reason
+    expected = ("validation", "simulation", "check") if known else ("extremes", "simulation", "outcome")
+    assert (row.suite, row.method, row.metric) == expected and row.scene == case.name
 
 
 def test_study_smoke_runs_the_quick_ones_unless_one_is_named():

@@ -1,4 +1,4 @@
-"""Networks from files in the place of trainings: which are taken, which refused, and what rows say."""
+"""Networks: a killed training goes on; files in the place of trainings, what is taken, refused and said."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Network, Plan
 from benchmarks.results.row import BEFORE_FRAMES
-from benchmarks.results.run_folder import RunFolder
+from benchmarks.results.run_folder import RunFolder, model_path
 from benchmarks.runner.networks import NetworkTraining, pretrained_network, put_into_package, take, train
 from benchmarks.runner.rows import rows_of
 from benchmarks.runner.run_json import described
@@ -23,7 +23,15 @@ from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.runner.task import Outcome
 from snug.named_recipes import PBNS
 from snug.networks.trained_model import TrainedModel
-from tests.benchmarks.runner.tasks_by_hand import TINY, assets_of, context, dressed_scene, plan_of
+from snug.training.optimisation_step import Trainer
+from tests.benchmarks.runner.tasks_by_hand import (
+    TINY,
+    assets_of,
+    context,
+    dressed_scene,
+    plan_of,
+    training,
+)
 from tests.snug.training.dressing import swaying, tube_dress
 
 WALK = dataclasses.replace(swaying(16), name="walk")
@@ -135,3 +143,42 @@ def test_networks_of_a_run_become_those_of_the_package(made, tmp_path):
     assert put_into_package(run.path, tmp_path) == ["pbns-tshirt"]
     file = tmp_path / "pbns-tshirt.safetensors"
     assert file.read_bytes() == (run.models / "pbns-seed0.safetensors").read_bytes()
+
+
+CHECKPOINT = ".snug-seed0.checkpoint.safetensors"
+
+
+def test_a_training_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
+    monkeypatch.setattr("benchmarks.runner.networks.CHECKPOINT_MINUTES", 1e-9)
+    dressed, motion = tube_dress(), swaying(30)
+    assets, step, done = assets_of(dressed, motion), Trainer.step, []
+
+    def trained(folder, key, stop=99):
+        """Train, in this run as far as some steps; `done` are those of this run."""
+
+        def counted(self, number):
+            if len(done) == stop:
+                raise KeyboardInterrupt
+            done.append(number)
+            return step(self, number)
+
+        done.clear()
+        monkeypatch.setattr(Trainer, "step", counted)
+        return train(training("snug", motion.name, steps=5, key=key), context(folder, assets), {})
+
+    models = RunFolder(tmp_path).models
+    for key in ("before", "now"):  # the first is another training: of other inputs, or of other code
+        with pytest.raises(KeyboardInterrupt):
+            trained(tmp_path, key, 3)
+        assert done == list(range(3))
+        assert [path.name for path in models.iterdir()] == [CHECKPOINT]
+    assert trained(tmp_path, "now").result["steps"] == 5 and done == [3, 4]
+    (tmp_path / "damaged" / "models").mkdir(parents=True)
+    (tmp_path / "damaged" / "models" / CHECKPOINT).write_bytes(b"half")
+    trained(tmp_path / "damaged", "now")
+    one, other = (
+        weights(model_path(RunFolder(folder).models, "snug", 0))
+        for folder in (tmp_path, tmp_path / "damaged")
+    )
+    assert all(torch.equal(one[name], other[name]) for name in one)
+    assert [path.name for path in models.iterdir()] == ["snug-seed0.safetensors"]
