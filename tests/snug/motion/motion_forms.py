@@ -77,7 +77,8 @@ def write_forms(folder: Path, motion, turn=Y_UP) -> list[Path]:
     files.append(folder / "ours.bvh")
     files[-1].write_text(bvh(poses, trans, fps))
     files.append(folder / "mixamo.bvh")
-    files[-1].write_text(bvh(poses, trans, fps, names=MIXAMO, order="XYZ", unit=0.01))
+    names = {ours: f"mixamorig:{theirs}" for ours, theirs in MIXAMO.items()}
+    files[-1].write_text(bvh(poses, trans, fps, names=names, order="XYZ", unit=0.01))
     return files
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import torch
 
 from snug.body.parametric_body import Body
+from snug.body.skinning import skin
 from snug.garments.garment import Garment
 from snug.garments.meshing import nearest_body_vertices
 from snug.garments.templates import find_template
@@ -16,7 +17,7 @@ from snug.kinds import KINDS
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
 from snug.recipe import DEFAULT, Recipe
-from snug.training.contact_cache import PARTS
+from snug.training.contact_cache import PARTS, Patch
 from snug.training.optimisation_step import Trainer
 from snug.training.train_network import train_network
 
@@ -75,6 +76,16 @@ def leaning(motion: Motion) -> Motion:
     poses = motion.poses.copy()
     poses[:, 0] += [0.3, 0.0, 0.2]
     return Motion(motion.name, poses, motion.translations, fps=motion.fps)
+
+
+def beside_skin(contact, frames: list[int], **region) -> tuple[Patch, torch.Tensor, torch.Tensor]:
+    """The patch of skin that samples may touch; it (T, P, 3) and the tube in frames of swaying(), posed."""
+    dressed = tube_dress()
+    patch = Patch(contact.rest_samples, dressed.body.shaped(), dressed.body.faces, **region)
+    weights = torch.as_tensor(dressed.body.skinning_weights[patch.body_vertices]).float()
+    transforms = dressed.transforms(swaying().poses[frames])
+    posed = skin(torch.as_tensor(patch.rest), weights, transforms)
+    return patch, posed, skin(dressed.rest(), dressed.weights(5), transforms)
 
 
 def planes_of(anchors, frames, rows, positions, normals) -> tuple[np.ndarray, np.ndarray]:

@@ -9,16 +9,15 @@ import torch
 
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
 from reference_sim.kernels.fast_kernels import fast_kernel
-from snug.body.skinning import skin
 from snug.kernels.contact import byte_normals
 from snug.kernels.skinning import from_lanes, to_lanes
 from snug.named_recipes import PAPER
 from snug.training import contact_planes
-from snug.training.contact_cache import ContactCache, Patch
+from snug.training.contact_cache import ContactCache
 from snug.training.contact_cache_torch import TensorContactCache
 from snug.training.device import CPU
 from snug.training.physics_loss import STATIC
-from tests.snug.training.dressing import PLAIN, make_trainer, planes_of, swaying, tube_dress
+from tests.snug.training.dressing import PLAIN, beside_skin, make_trainer, planes_of, swaying, tube_dress
 
 
 @pytest.mark.parametrize(
@@ -73,30 +72,17 @@ def test_anchors_walk_to_the_closest_skin_by_torch_and_by_kernels(region):
     """From the anchors of another pose: on one smooth sheet a walk ends where a search ends, unless the
     rule of regions is so narrow that it stops the walk.
     """
-    dressed, motion = tube_dress(), swaying()
-    contact, body = ContactPenalty(dressed.cloth), dressed.body
-    patch = Patch(contact.rest_samples, body.shaped(), body.faces, region=region)
-    weights = torch.as_tensor(body.skinning_weights[patch.body_vertices]).float()
-    transforms = dressed.transforms(motion.poses[[2, 9]])
-    positions = skin(torch.as_tensor(patch.rest), weights, transforms)
+    contact = ContactPenalty(tube_dress().cloth)
+    patch, positions, garment = beside_skin(contact, [2, 9], region=region)
     normals = byte_normals(positions.numpy(), patch.faces)
-    x = skin(dressed.rest(), dressed.weights(5), transforms) + torch.tensor([0.0, 0.03, -0.05])
+    x = garment + torch.tensor([0.0, 0.03, -0.05])
     samples = torch.stack([torch.as_tensor(contact.sample_matrix @ y).float() for y in x.numpy()])
     frames, rows = np.array([1, 0]), np.arange(2)
-    still, fast, searched, slow = (
-        *(ContactCache(patch, 2) for _ in range(3)),
-        TensorContactCache(patch, 2, CPU),
-    )
+    still, fast, searched = (ContactCache(patch, 2) for _ in range(3))
+    slow = TensorContactCache(patch, 2, CPU)
     lanes = to_lanes(x[:, None])
-    on = (
-        contact,
-        lanes,
-        np.zeros_like(lanes),
-        frames[:, None],
-        rows[:, None],
-        positions.numpy(),
-        normals,
-    )
+    gradients, body = np.zeros_like(lanes), positions.numpy()
+    on = contact, lanes, gradients, frames[:, None], rows[:, None], body, normals
     assert fast.energy(*on).sum() > 0 and (fast.faces == still.faces).all()
     fast.energy(*on, walk=True)
     chosen = torch.as_tensor(frames)

@@ -1,4 +1,4 @@
-"""Training follows its recipe, survives files, and names what goes wrong."""
+"""Training follows its recipe, survives files, and names what goes wrong; so does its command."""
 
 from dataclasses import replace
 
@@ -7,10 +7,12 @@ import pytest
 import torch
 from safetensors.torch import save_file
 
+from snug.motion.library import TRAIN
 from snug.named_recipes import PAPER
 from snug.networks import trained_model
 from snug.networks.trained_model import ModelFileError, TrainedModel
 from snug.recipe import DEFAULT
+from snug.train import choose_motions, main, parse_options
 from snug.training.augmentation import augment
 from snug.training.train_network import untrained_model
 from tests.snug.training.dressing import PLAIN, make_trainer, short, swaying, tube_dress
@@ -89,3 +91,25 @@ def test_paper_recipe_varies_the_body(monkeypatch):
         trainer.step(number)
     betas = np.concatenate(shapes)
     assert betas.shape == (8 * 16, 10) and 2.5 < betas.max() <= 3 and -3 <= betas.min() < -2.5
+
+
+def test_motions_that_validate_do_not_train():
+    training, validation = choose_motions(parse_options(["--validation", "kick", "--validation", "bow"]))
+    assert [motion.name for motion in validation] == ["kick", "bow"]
+    assert [motion.name for motion in training] == list(TRAIN)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "hint"),
+    [
+        ("-o {0}/file/model.safetensors", "file"),
+        ("--seed -1", "seed=-1: give a number from 0"),
+        ("--patience 3", "--patience 3: add --validation NAME"),
+        ("--motions {0}/nowhere", "nowhere"),
+        ("--validation dance_turn", "no such motion among 07_01"),
+    ],
+)
+def test_command_line_refuses_what_it_could_not_do(arguments, hint, refused, tmp_path):
+    (tmp_path / "file").touch()
+    given = ["-o", str(tmp_path / "model.safetensors"), "--vertices", "200"]
+    refused(hint, main, [*given, *arguments.format(tmp_path).split()])

@@ -16,7 +16,7 @@ from snug.named_recipes import PAPER, PBNS_SPRINGS, RECIPES
 from snug.recipe import DEFAULT, Recipe
 from snug.training.contact_cache import EXACT, PARTS, ContactCache, Patch
 from snug.training.physics_loss import ClosedForm, PhysicsLoss, make_contact
-from tests.snug.training.dressing import planes_of, swaying, tube_dress
+from tests.snug.training.dressing import beside_skin, planes_of, swaying, tube_dress
 
 DT = 1 / 30
 
@@ -103,15 +103,10 @@ def found(patch: Patch, anchors: np.ndarray, weights: np.ndarray, positions: np.
 
 
 def test_contact_search_finds_the_closest_allowed_point():
-    dressed, motion = tube_dress(), swaying()
-    contact = ContactPenalty(dressed.cloth)
-    body = dressed.body
+    contact = ContactPenalty(tube_dress().cloth)
     # A region this small leaves many a sample's nearest skin out of bounds when the trunk bends.
-    patch = Patch(contact.rest_samples, body.shaped(), body.faces, region=0.07)
-    weights = torch.as_tensor(body.skinning_weights[patch.body_vertices]).float()
-    transforms = dressed.transforms(motion.poses[[8]])
-    skin_now = skin(torch.as_tensor(patch.rest), weights, transforms)[0].numpy()
-    garment = skin(dressed.rest(), dressed.weights(5), transforms)[0].numpy()
+    patch, *posed = beside_skin(contact, [8], region=0.07)
+    skin_now, garment = (x[0].numpy() for x in posed)
     samples = (contact.sample_matrix @ garment + [0.0, 0.05, 0.0]).astype(np.float32)
     # Some of them are drawn to where they may touch, so that all distances from nothing to 8 cm occur.
     touched = found(patch, *patch.search(samples, skin_now, exact=True), skin_now)
@@ -146,21 +141,12 @@ def test_contact_search_finds_the_closest_allowed_point():
 
 @pytest.mark.parametrize("recipe", [DEFAULT, PBNS_SPRINGS], ids=["cubic", "squared"])
 def test_energy_at_anchors_is_that_of_their_planes(recipe):
-    dressed, motion = tube_dress(), swaying()
-    contact, body = make_contact(dressed.cloth, recipe), dressed.body
-    patch = Patch(contact.rest_samples, body.shaped(), body.faces)
-    weights = torch.as_tensor(body.skinning_weights[patch.body_vertices]).float()
-    transforms = dressed.transforms(motion.poses[[2, 9]])
-    skin_now = skin(torch.as_tensor(patch.rest), weights, transforms).numpy()
-    garment = skin(dressed.rest(), dressed.weights(5), transforms)
-    x = garment - torch.tensor(
-        [0.0, 0.0, 0.05]
-    )  # the back a little off the skin, the front deep under it
-    anchors, frames, normals = (
-        ContactCache(patch, 3),
-        np.array([2, 0]),
-        byte_normals(skin_now, patch.faces),
-    )
+    contact = make_contact(tube_dress().cloth, recipe)
+    patch, posed, garment = beside_skin(contact, [2, 9])
+    # The back lies a little off the skin, the front deep under it.
+    x, skin_now = garment - torch.tensor([0.0, 0.0, 0.05]), posed.numpy()
+    anchors, frames = ContactCache(patch, 3), np.array([2, 0])
+    normals = byte_normals(skin_now, patch.faces)
     for row, frame in enumerate(frames):
         samples = (contact.sample_matrix @ x[row].numpy()).astype(np.float32)
         anchors.requery(int(frame), samples, skin_now[row])
