@@ -15,14 +15,12 @@ from reports.statistics.effects import (
     EXCESS,
     RANGE,
     RATIO,
-    Effect,
     cost_effect,
     effect,
     off_scale,
     on_scale,
 )
 from reports.statistics.means_and_spreads import Mean, mean_of, pair
-from reports.statistics.verdicts import standing, why_open
 from tests.reports.report_folder import row, run_of
 
 
@@ -268,19 +266,6 @@ def test_two_starts_make_the_noise_and_smaller_steps_a_trend_that_may_turn_the_s
     # Smaller steps alone have no noise.
     trend = effect(*moved_means({"snug": ((0.0,), (0.0,)), "pbns": ((), ())}), DIFFERENCE)
     assert trend.uncertainty == 0.0
-
-
-@pytest.mark.parametrize(("change", "expected"), [(0.3, "less"), (0.7, "inconclusive")])
-def test_a_verdict_stands_where_every_time_step_has_its_sign(change, expected):
-    far = Effect(-0.5, RATIO, error=0.1, freedom=10.0, motions=20, against={"simulation-dt/8": change})
-    assert standing(far, 0.001) == expected
-    assert why_open(far) == (": other sign against simulation-dt/8" if expected == "inconclusive" else "")
-
-
-@pytest.mark.parametrize(("change", "expected"), [(0.02, "tie"), (0.2, "inconclusive")])
-def test_a_tie_is_one_against_every_time_step(change, expected):
-    near = Effect(0.0, RATIO, error=0.01, freedom=10.0, motions=20, against={"simulation-dt/8": change})
-    assert standing(near, near.p_value()) == expected
 
 
 def test_uncertainties_of_two_runs_add_up_as_independent_ones():

@@ -8,56 +8,58 @@ import pytest
 
 from benchmarks.metric import Metric
 from reports.statistics.effects import DIFFERENCE, RANGE, RATIO, Effect
-from reports.statistics.verdicts import LESS, MORE, OPEN, TIED, compare_methods, holm, standing, untested
+from reports.statistics.verdicts import LESS, MORE, OPEN, TIED, compare_methods, holm, standing, why_open
 from tests.reports.report_folder import row, run_of
 
-FOUR = {"scale": RATIO, "freedom": 10.0, "motions": 4}
+FAR = Effect(0.2, RATIO, error=0.01, freedom=10.0, motions=4)
+NEAR = replace(FAR, value=0.01)
+PLAIN = replace(FAR, value=0.03, scale=DIFFERENCE, error=0.005)
+COST = Effect(-0.4, RATIO, covers=RANGE)
+STEP = "simulation-dt/8"
 
 
 @pytest.mark.parametrize(
-    ("value", "error", "expected"),
+    ("far", "changed", "expected"),
     [
-        (0.01, 0.01, TIED),  # 2.2 errors below 5 %
-        (0.01, 0.03, OPEN),  # the interval reaches beyond
-        (0.2, 0.01, MORE),
-        (-0.2, 0.01, LESS),
-        (0.2, 0.1, OPEN),
-        (0.04, 0.001, TIED),  # surely different, and negligible
+        # A tie is an interval within the margin of 5 %, and not a point estimate.
+        (NEAR, {}, TIED),
+        (NEAR, {"error": 0.03}, OPEN),
+        (NEAR, {"value": 0.04, "error": 0.001}, TIED),  # surely different, and negligible
+        (FAR, {}, MORE),
+        (FAR, {"value": -0.2}, LESS),
+        (FAR, {"error": 0.1}, OPEN),
+        # The noise of the reference widens the margin and the least difference.
+        (FAR, {"uncertainty": 0.1}, MORE),
+        (FAR, {"uncertainty": 0.21}, OPEN),
+        (FAR, {"uncertainty": 0.3}, TIED),
+        # A verdict is one against each time step of the reference.
+        (FAR, {"against": {STEP: -0.1}}, MORE),
+        (FAR, {"against": {STEP: -0.3}}, OPEN),
+        (NEAR, {"against": {STEP: 0.01}}, TIED),
+        (NEAR, {"against": {STEP: 0.2}}, OPEN),
+        # Few motions, one seed, or nothing repeated.
+        (FAR, {"motions": 3}, OPEN),
+        (FAR, {"one_seed": True}, OPEN),
+        (FAR, {"error": None}, OPEN),
+        # A plain difference is a tie within 5 % of its unit.
+        (PLAIN, {"unit": 1.0}, TIED),
+        (PLAIN, {"unit": 0.5}, MORE),
+        (PLAIN, {"unit": 0.0}, MORE),
+        # A cost is judged by its range.
+        (COST, {"limits": (-0.5, -0.3)}, LESS),
+        (COST, {"limits": (0.1, 0.9)}, MORE),
+        (COST, {"limits": (-0.1, 0.2)}, OPEN),
+        (COST, {"limits": (-0.01, 0.02)}, TIED),
+        (COST, {"limits": None}, OPEN),
     ],
 )
-def test_a_tie_is_an_interval_within_the_margin_and_not_a_point_estimate(value, error, expected):
-    far = Effect(value, error=error, **FOUR)
+def test_how_one_method_stands_to_another(far, changed, expected):
+    far = replace(far, **changed)
     assert standing(far, far.p_value()) == expected
-
-
-def test_the_spread_of_the_ensemble_widens_the_margin_and_the_least_difference():
-    far = Effect(0.2, error=0.01, **FOUR)
-    stands = {
-        moved: standing(replace(far, uncertainty=moved), far.p_value()) for moved in (0.1, 0.21, 0.3)
-    }
-    assert stands == {0.1: MORE, 0.21: OPEN, 0.3: TIED}
-
-
-def test_below_four_motions_with_one_seed_or_unrepeated_it_is_inconclusive():
-    far = Effect(0.5, error=0.01, **FOUR)
-    assert standing(far, 1e-9) == MORE
-    for changed in ({"motions": 3}, {"one_seed": True}, {"error": None}):
-        less = replace(far, **changed)
-        assert standing(less, less.p_value()) == OPEN
 
 
 def test_a_corrected_p_value_above_the_level_is_inconclusive():
-    far = Effect(0.5, error=0.1, **FOUR)
-    assert standing(far, far.p_value()) == MORE and standing(far, 0.06) == OPEN
-
-
-@pytest.mark.parametrize(
-    ("limits", "expected"),
-    [((-0.5, -0.3), LESS), ((0.1, 0.9), MORE), ((-0.1, 0.2), OPEN), ((-0.01, 0.02), TIED), (None, OPEN)],
-)
-def test_a_cost_is_judged_by_its_range(limits, expected):
-    far = Effect(-0.4, RATIO, covers=RANGE, limits=limits)
-    assert standing(far, far.p_value()) == expected
+    assert standing(FAR, 0.04) == MORE and standing(FAR, 0.06) == OPEN
 
 
 def test_one_reading_of_a_clock_gives_no_verdict_and_one_of_a_size_does():
@@ -73,22 +75,19 @@ def test_one_reading_of_a_clock_gives_no_verdict_and_one_of_a_size_does():
         ).effect
         for name, of in (("cost/frame", "machine"), ("cost/memory", "method"))
     )
-    assert (standing(time, None), untested(time)) == (OPEN, ": no range")
-    assert (standing(size, None), untested(size)) == (LESS, "")
+    assert (standing(time, None), why_open(time)) == (OPEN, ": no range")
+    assert (standing(size, None), why_open(size)) == (LESS, "")
 
 
-def test_a_claimed_factor_moves_the_effect():
-    far = Effect(-5.0, error=0.01, **FOUR)  # a factor of 148
-    assert standing(far, far.p_value(100.0), 100.0) == LESS
-    assert standing(far, far.p_value(200.0), 200.0) == MORE
-    assert standing(far, far.p_value(148.4), 148.4) == TIED
+@pytest.mark.parametrize(("factor", "expected"), [(100.0, LESS), (200.0, MORE), (148.4, TIED)])
+def test_a_claimed_factor_moves_the_effect(factor, expected):
+    far = replace(FAR, value=-5.0)  # a factor of 148
+    assert standing(far, far.p_value(factor), factor) == expected
 
 
-def test_a_plain_difference_is_a_tie_within_5_percent_of_its_unit():
-    far = Effect(0.03, DIFFERENCE, error=0.005, freedom=10.0, motions=4, unit=1.0)
-    assert standing(far, far.p_value()) == TIED
-    assert standing(replace(far, unit=0.5), far.p_value()) == MORE
-    assert standing(replace(far, unit=0.0), far.p_value()) == MORE
+def test_a_time_step_with_another_sign_is_named():
+    far = replace(FAR, against={"simulation-dt/4": -0.1, STEP: -0.3})
+    assert why_open(far) == f": other sign against {STEP}"
 
 
 def test_holm_by_hand():
