@@ -9,10 +9,10 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
-from benchmarks.plan.study import StudyError, read_study, study_names
+from benchmarks.plan.study import Show, StudyError, read_study, study_names
 from benchmarks.provenance import commit
 from benchmarks.results.row import USABLE, ResultsError
-from benchmarks.results.run_folder import RunFolder
+from benchmarks.results.run_folder import RunFolder, model_path
 from benchmarks.runner.execute_plan import accepted
 from benchmarks.timing import one_thread
 from reference_sim.command_line import Parser, command
@@ -90,7 +90,7 @@ def publish(name: str, out: Path, into: Path, head: str) -> None:
         path = whole / "figures" / film
         path.unlink(missing_ok=True)
         _call("reports.film", str(whole), *shlex.split(wanted), "-o", str(path))
-    keep(whole, into / whole.name, show.files)
+    keep(whole, into / whole.name, show)
     print(f"{name}: published in {into / whole.name}", flush=True)
 
 
@@ -112,22 +112,35 @@ def all_usable(folder: RunFolder) -> bool:
     return bool(config.get("finished")) and all(counted) and not any(failed)
 
 
-def keep(whole: Path, target: Path, shown: Sequence[str]) -> None:
+def keep(whole: Path, target: Path, show: Show) -> None:
     """Replace the folder `target` by what is published of the run in `whole`.
 
-    Raises ResultsError where a picture or film of the names in `shown` is not there.
+    Raises ResultsError where a picture, film or network of `show` is not there.
     """
-    kept = [whole / name for name in KEPT] + [whole / "figures" / name for name in shown]
+    networks = [model_path(whole / "models", name, seed=0) for name in show.networks]
+    kept = [whole / name for name in KEPT] + [whole / "figures" / name for name in show.files]
     kept += [path for path in [whole / "frame_energies.csv"] if path.exists()]
-    if missing := [path for path in kept if not path.exists()]:
-        raise ResultsError(f"{missing[0]}: not there, and the documents show it")
+    if missing := [path for path in (*kept, *networks) if not path.exists()]:
+        raise ResultsError(f"{missing[0]}: not there, and the study publishes it")
     fresh = target.with_name(f"{target.name}.new")
     shutil.rmtree(fresh, ignore_errors=True)
     with new_folder(fresh) as part:
         for path in kept:
             shutil.copytree(path, part / path.name) if path.is_dir() else shutil.copy(path, part)
+        for path in networks:
+            save_half(path, part / path.relative_to(whole))
     shutil.rmtree(target, ignore_errors=True)
     fresh.rename(target)
+
+
+def save_half(model: Path, copy: Path) -> None:
+    """Write a copy of a network with weights and input statistics in half precision."""
+    from snug.networks.trained_model import TrainedModel
+
+    rounded = TrainedModel.load(model)
+    rounded.network.half()
+    copy.parent.mkdir(exist_ok=True)
+    rounded.save(copy)
 
 
 if __name__ == "__main__":

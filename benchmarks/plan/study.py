@@ -53,19 +53,21 @@ class Part:
 
 @dataclass(frozen=True, kw_only=True)
 class Show:
-    """Pictures and films of a published run that the documents show, besides its rows, tables and PDF.
+    """What is published of a run besides its rows, tables and PDF.
 
     Attributes:
-        pictures: names of figures of the report.
+        networks: names of networks whose seed 0 is kept, in half precision.
+        pictures: names of figures of the report that the documents show.
         films: file -> options of reports.film.
     """
 
+    networks: tuple[str, ...] = ()
     pictures: tuple[str, ...] = ()
     films: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def files(self) -> tuple[str, ...]:
-        """Names of all these files in the folder `figures` of a report."""
+        """Names of the pictures and films in the folder `figures` of a report."""
         return (*(f"{name}.png" for name in self.pictures), *self.films)
 
 

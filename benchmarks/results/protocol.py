@@ -82,5 +82,5 @@ def noise(moved: Mapping[str, float]) -> float | None:
 
 
 def trend(moved: Mapping[str, float]) -> dict[str, float]:
-    """Return the changes by simulations with smaller time steps alone."""
-    return {name: change for name, change in moved.items() if name not in STARTS[1]}
+    """Return the changes by members of FAMILY with smaller time steps alone."""
+    return {name: change for name, change in moved.items() if name in FAMILY and name not in STARTS[1]}

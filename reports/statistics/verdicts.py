@@ -111,11 +111,12 @@ def untested(far: Effect) -> str:
 def why_open(far: Effect, factor: float = 1.0) -> str:
     """Return why an effect is inconclusive, as a remark behind it: untested, or turned by smaller steps.
 
-    >>> why_open(Effect(0.5, "ratio", motions=20, against={"simulation-dt/8": -0.6}))
+    >>> why_open(Effect(0.5, "ratio", error=0.1, motions=20, against={"simulation-dt/8": -0.6}))
     ': other sign against simulation-dt/8'
     """
-    turned = ", ".join(far.turned_by(factor))
-    return untested(far) or (f": other sign against {turned}" if turned else "")
+    p, turned = far.p_value(factor), ", ".join(far.turned_by(factor))
+    seen = p is not None and p < LEVEL and abs(far.above(factor)) > far.uncertainty
+    return untested(far) or (f": other sign against {turned}" if turned and seen else "")
 
 
 def _standing_of_range(far: Effect, factor: float) -> str:

@@ -6,12 +6,17 @@ import subprocess
 from types import SimpleNamespace
 
 import pytest
+import torch
 
 from benchmarks import publish as command
+from benchmarks.plan.study import Show
 from benchmarks.provenance import commit
 from benchmarks.publish import all_usable, keep, publish
 from benchmarks.results.row import ResultsError, Row
 from benchmarks.results.run_folder import RunFolder
+from snug.networks.garment_network import make_network
+from snug.networks.trained_model import TrainedModel
+from snug.recipe import DEFAULT
 
 FALL = """question = "?"
 sizes = "smoke"
@@ -37,13 +42,22 @@ def test_what_is_published_is_replaced_whole_or_left(tmp_path):
     for path in [*(whole / name for name in made.split()), target / "tables" / "old.csv"]:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(path.name)
-    with pytest.raises(ResultsError, match=r"figures/none\.png: not there"):
-        keep(whole, target, ["none.png"])
+    for show in (Show(pictures=("none",)), Show(networks=("none",))):
+        with pytest.raises(ResultsError, match=r"none[-.\w]*: not there"):
+            keep(whole, target, show)
     assert [path.name for path in target.rglob("*.*")] == ["old.csv"]
-    keep(whole, target, ["lead.png"])
-    kept = ["energies.csv", "lead.png", "report.pdf", "results.csv", "run.json"]
+    network = TrainedModel(
+        "pbns", make_network("pbns", 141, 4, DEFAULT, seed=0), DEFAULT, origin={"a": 1}
+    )
+    network.save(whole / "models/pbns-seed0.safetensors")
+    keep(whole, target, Show(pictures=("lead",), networks=("pbns",)))
+    kept = ["energies.csv", "lead.png", "pbns-seed0.safetensors", "report.pdf", "results.csv", "run.json"]
     assert sorted(path.name for path in target.rglob("*.*")) == kept
     assert [path.name for path in target.parent.iterdir()] == ["run"]
+    rounded = TrainedModel.load(target / "models/pbns-seed0.safetensors")
+    assert rounded.origin == network.origin
+    for ours, theirs in zip(rounded.network.parameters(), network.network.parameters(), strict=True):
+        assert ours.dtype == theirs.dtype and torch.allclose(ours, theirs, rtol=1e-3, atol=1e-7)
 
 
 def test_a_run_that_fails_or_is_of_another_commit_is_left(tmp_path, monkeypatch, fall):
