@@ -24,7 +24,7 @@ from reference_sim.energies.contact_penalty import sample_depth
 from reference_sim.energies.stretch_stvk import strain
 from reference_sim.kernels.fast_kernels import SCRATCH_SHAPE, step_terms
 from reference_sim.minimise.newton import Newton
-from tests.benchmarks.runner.tasks_by_hand import small_scene
+from tests.benchmarks.runner.tasks_by_hand import simulated, small_scene
 
 DT = 1 / 30
 
@@ -98,9 +98,7 @@ def test_block_descent_falls_with_every_sweep_to_the_minimum_and_stays_there(tou
 def test_the_reference_is_where_another_solver_ends_from_another_start(name):
     """Block descent shares neither derivatives nor steps with the simulator; its start is 1 mm away."""
     scene = small_scene(name)
-    run = simulate(
-        scene.cloth, scene.energies, dt=scene.dt, frames=8, obstacle=scene.obstacle, start=scene.start
-    )
+    run = simulated(scene, frames=8)
     potential = Potential([*scene.energies, Inertia(scene.cloth, scene.dt)])
     for frame in (4, 7):
         before, previous, x = run.positions[frame - 2 : frame + 1]
@@ -119,9 +117,8 @@ def test_xpbd_finds_the_minimum_where_its_constraints_are_linear_and_nearly_else
     positions, faces = square_sheet(4, 0.2)
     cloth = Cloth(positions, faces, Material(), pins=(0, 4))
     potential = Potential([StretchStVK(cloth), Inertia(cloth, DT)])
-    velocity = (
-        1e-6 * np.random.default_rng(4).normal(size=positions.shape) * [1, 0, 1]
-    )  # in the plane, tiny
+    noise = np.random.default_rng(4).normal(size=positions.shape)
+    velocity = 1e-6 * noise * [1, 0, 1]  # in the plane, tiny
     velocity[cloth.pins] = 0.0
     guess = positions + DT * velocity
     potential.prepare(Step(positions, velocity, guess, DT))
@@ -151,9 +148,8 @@ def test_a_runaway_is_a_status(method, touching, monkeypatch):
     potential, guess = touching
     nowhere = guess.copy()
     nowhere[10] = np.nan
-    monkeypatch.setattr(
-        potential.energies[-1], "x_hat", nowhere
-    )  # inertia: XPBD starts from the prediction
+    inertia = potential.energies[-1]
+    monkeypatch.setattr(inertia, "x_hat", nowhere)  # XPBD starts from the prediction
     result = method(potential, max_iterations=3).minimise(nowhere)
     assert result.status == "diverged" and result.reason
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Iterator
 from types import SimpleNamespace
 
@@ -11,10 +12,10 @@ import pytest
 from benchmarks.method import Method
 from benchmarks.methods.simulation import Simulation
 from benchmarks.methods.warm_started import WarmStarted
-from reference_sim import cholesky, potential, simulate
+from reference_sim import cholesky, potential
 from reference_sim.minimise import factorised, lbfgs
 from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS
-from tests.benchmarks.runner.tasks_by_hand import prepared, small_scene
+from tests.benchmarks.runner.tasks_by_hand import prepared, simulated, small_scene
 
 SOLVERS = (
     "simulation", "simulation-dt/2", "simulation-refrozen", "newton-2", "lbfgs-10", "fast-lbfgs-10", "vbd-20",
@@ -31,11 +32,9 @@ def simulated_anew(method: Simulation) -> np.ndarray:
     scene = method.scene
     assert scene is not None
     options = method.options | {"substeps": scene.substeps * method.options.get("substeps", 1)}
-    energies = scene.energies if "max_iterations" in options else scene.simulated_energies
-    return simulate(
-        scene.cloth, energies, dt=scene.dt, frames=scene.frames, obstacle=scene.obstacle, start=scene.start,
-        velocity=scene.start_velocity, pin_positions=scene.pin_positions, **options,
-    ).positions  # fmt: skip
+    if "max_iterations" not in options:
+        scene = dataclasses.replace(scene, energies=scene.simulated_energies)
+    return simulated(scene, **options).positions
 
 
 def assert_sets_nothing_up(method: Method, monkeypatch) -> None:

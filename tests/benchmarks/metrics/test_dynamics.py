@@ -77,9 +77,8 @@ def test_response_takes_the_yaw_where_it_turns_and_the_displacement_where_it_shi
 
 
 def test_amplitude_and_correlation_of_phase_shifted_parts():
-    whole = (
-        2 * np.pi * 3 * np.arange(FRAMES) / FRAMES
-    )  # three whole periods: sine and cosine are orthogonal
+    # Three whole periods: sine and cosine are orthogonal.
+    whole = 2 * np.pi * 3 * np.arange(FRAMES) / FRAMES
     one = np.sin(whole)[:, None, None] * np.array([1.0, 0.0, 0.0]) * np.ones((1, 7, 1))
     other = 0.5 * np.sin(whole - 0.6)[:, None, None] * np.array([1.0, 0.0, 0.0]) * np.ones((1, 7, 1))
     assert amplitude(other, one) == pytest.approx(0.5)

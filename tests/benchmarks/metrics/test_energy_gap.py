@@ -19,9 +19,9 @@ from benchmarks.metrics import energy_gap as module
 from benchmarks.metrics.curvature import curvature_error, curvature_series
 from benchmarks.metrics.energy import first_guess
 from benchmarks.metrics.energy_gap import gap_scale, optimality, spread_evenly
-from reference_sim import Potential, minimise, simulate
+from reference_sim import Potential, minimise
 from reference_sim.energies import Inertia, Step
-from tests.benchmarks.runner.tasks_by_hand import grouped, prepared, small_scene
+from tests.benchmarks.runner.tasks_by_hand import grouped, prepared, simulated, small_scene
 
 YOUNG, POISSON, THICKNESS, DENSITY, BENDING, G = 70e3, 0.485, 0.47e-3, 426.0, 3.96e-5, 9.81
 
@@ -138,9 +138,8 @@ def test_the_gap_is_zero_for_the_reference_and_falls_with_the_iterations(name):
     scene = small_scene(name)
 
     def judged(**options):
-        given = {"obstacle": scene.obstacle, "start": scene.start} | options
-        trajectory = simulate(scene.cloth, scene.energies, dt=scene.dt, frames=10, **given)
-        return values(optimality(scene, trajectory.positions, samples=99).metrics())
+        positions = simulated(scene, frames=10, **options).positions
+        return values(optimality(scene, positions, samples=99).metrics())
 
     whole, some, one = judged(), judged(max_iterations=8), judged(max_iterations=1)
     for metric in ("gap/energy", "gradient/norm", "step/distance"):
@@ -159,7 +158,7 @@ def test_the_gap_is_zero_for_the_reference_and_falls_with_the_iterations(name):
 def test_one_scale_serves_all_methods_of_a_scene():
     """The scale is the mean energy of first guess minus reference step; a method's history does not enter."""
     scene = small_scene("hanging_sheet", cells=4)
-    x = simulate(scene.cloth, scene.energies, dt=scene.dt, frames=8, start=scene.start).positions
+    x = simulated(scene, frames=8).positions
     wild = x + 0.05 * np.random.default_rng(0).standard_normal(x.shape)
     group = grouped(scene, {"simulation": x, "newton-1": wild})
     scale, potential = gap_scale(group), Potential([*scene.energies, Inertia(scene.cloth, scene.dt)])
@@ -193,7 +192,7 @@ def test_a_reference_above_the_first_guess_has_no_scale_and_gaps_are_measured(sc
 
 def test_every_judged_frame_counts_and_those_of_the_warm_up_do_not():
     scene = small_scene("hanging_sheet", cells=4)
-    x = simulate(scene.cloth, scene.energies, dt=scene.dt, frames=9, start=scene.start).positions.copy()
+    x = simulated(scene, frames=9).positions.copy()
     x[4] += 1e-3
     all_of = optimality(scene, x, samples=99)
     assert len(all_of.values["gap/energy"]) == 7 and all_of.metrics()["gap/energy"].uncertainty == 0.0
@@ -208,8 +207,7 @@ def test_frames_are_sampled_evenly_and_until_the_mean_is_known(monkeypatch):
     assert sorted(spread_evenly(range(3, 14))) == list(range(3, 14))
     assert sorted(itertools.islice(spread_evenly(range(64)), 8)) == list(range(0, 64, 8))
     scene = small_scene("hanging_sheet", cells=4)
-    x = simulate(scene.cloth, scene.energies, dt=scene.dt, frames=40, start=scene.start, method="newton",
-                 max_iterations=1).positions  # fmt: skip
+    x = simulated(scene, frames=40, method="newton", max_iterations=1).positions
     few, whole = (optimality(scene, x, samples=samples) for samples in (4, 99))
     known, asked = few.metrics()["gap/energy"], whole.metrics()["gap/energy"]
     assert 4 <= len(few.values["gap/energy"]) <= len(whole.values["gap/energy"]) == 38

@@ -14,8 +14,8 @@ from benchmarks.metrics.energy import energy_series
 from benchmarks.metrics.penetration_and_distances import own_part_depth, penetration
 from benchmarks.metrics.scene_facts import inside_itself, measure_body
 from benchmarks.metrics.self_intersections import self_intersections
-from reference_sim import Obstacle, simulate
-from tests.benchmarks.runner.tasks_by_hand import small_scene
+from reference_sim import Obstacle
+from tests.benchmarks.runner.tasks_by_hand import simulated, small_scene
 
 
 class Slab:
@@ -74,9 +74,7 @@ def test_energies_of_a_rigid_acceleration_are_known_by_hand():
 
 def test_energies_are_those_that_the_simulator_minimised():
     scene = small_scene("sheet_on_sphere")
-    trajectory = simulate(
-        scene.cloth, scene.energies, dt=scene.dt, frames=10, obstacle=scene.obstacle, start=scene.start
-    )
+    trajectory = simulated(scene, frames=10)
     (series,) = energy_series(scene, [trajectory.positions])
     fields = trajectory.frame_fields
     for term in ("strain", "bending", "gravity", "inertia"):
@@ -110,9 +108,8 @@ def test_histogram_distance_is_the_shift_of_a_distribution_and_blind_to_places()
     assert histogram_distance(CurvatureSeries(h + 2.5, area), still) == pytest.approx([2.5, 2.5])
     # Two heaps against one between them: all of the area moves by 3.
     two = CurvatureSeries(np.array([[1.0, 7.0]]), np.array([[2.0, 2.0]]))
-    one = CurvatureSeries(
-        np.array([[4.0, 99.0]]), np.array([[0.3, 0.0]])
-    )  # boundary vertices weigh nothing
+    weights = np.array([[0.3, 0.0]])  # a boundary vertex weighs nothing
+    one = CurvatureSeries(np.array([[4.0, 99.0]]), weights)
     assert histogram_distance(two, one) == pytest.approx([3.0])
     assert histogram_distance(CurvatureSeries(h, 0 * area), still) == pytest.approx([0.0, 0.0])
 

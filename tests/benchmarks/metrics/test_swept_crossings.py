@@ -20,6 +20,11 @@ DOWN = np.array([0.0, 0.0, -0.5])
 NEEDLE = np.array([[-1.0, -0.01, 0.0], [1.0, 0.0, 0.0], [-1.0, 0.01, 0.0]])
 
 
+def roll_out_of(*frames, judged=slice(None)):
+    scene = SimpleNamespace(cloth=SimpleNamespace(faces=FACES), kept=None)
+    return SimpleNamespace(scene=scene, positions=np.stack(frames), judged=judged)
+
+
 def test_a_triangle_that_falls_through_another_takes_its_three_corners_with_it():
     before, after = np.concatenate([LARGE, SMALL]), np.concatenate([LARGE, SMALL + DOWN])
     for frame in (before, after):
@@ -54,9 +59,7 @@ def test_a_cloth_that_has_fallen_apart_is_left_out(monkeypatch):
         lost = before.copy()
         lost[1] += far
         assert swept_crossings(before, lost, FACES) is None
-        scene = SimpleNamespace(cloth=SimpleNamespace(faces=FACES), kept=None)
-        frames = np.stack([before, before, lost])
-        assert measure_swept(SimpleNamespace(scene=scene, positions=frames, judged=slice(0, None))) == {}
+        assert measure_swept(roll_out_of(before, before, lost)) == {}
     monkeypatch.setattr(module, "MOST_PAIRS", 2)
     assert swept_crossings(before, np.concatenate([LARGE, SMALL + DOWN]), FACES) is None
 
@@ -73,9 +76,7 @@ def test_what_ipctk_finds_to_meet_may_be_in_one_plane():
 
 def test_the_mean_is_of_steps_after_the_warm_up(monkeypatch):
     above, below = np.concatenate([LARGE, SMALL]), np.concatenate([LARGE, SMALL + DOWN])
-    scene = SimpleNamespace(cloth=SimpleNamespace(faces=FACES), kept=None)
-    frames = np.stack([above, below, above, above, above, below])
-    roll_out = SimpleNamespace(scene=scene, positions=frames, judged=slice(2, None))
+    roll_out = roll_out_of(above, below, above, above, above, below, judged=slice(2, None))
     assert measure_swept(roll_out) == {"intersections/swept": pytest.approx(1.0)}
     roll_out.judged = slice(5, None)
     assert measure_swept(roll_out) == {}

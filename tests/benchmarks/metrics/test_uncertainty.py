@@ -40,11 +40,8 @@ def test_the_uncertainty_of_a_distance_is_what_another_right_simulation_changes(
     assert dict(moved) == pytest.approx({TWIN: 4.0, SMALLER: -2.0})
     # A member is compared with the others, not with itself.
     value, uncertainty, moved = compared(group.roll_outs[1], geometry.compare)["distance/rms"]
-    assert (
-        value == pytest.approx(4.0)
-        and np.isnan(uncertainty)
-        and dict(moved) == pytest.approx({SMALLER: 2.0})
-    )
+    assert value == pytest.approx(4.0) and np.isnan(uncertainty)
+    assert dict(moved) == pytest.approx({SMALLER: 2.0})
     assert compared(group.roll_outs[0], geometry.compare) == {}
     alone = grouped(scene, {"simulation": x, "newton-1": x + 0.01 * EAST})
     assert compared(alone.roll_outs[1], geometry.compare)["distance/rms"] == pytest.approx(10.0)
@@ -109,9 +106,8 @@ def test_means_are_over_the_judged_frames_alone():
     late = x.copy()
     late[-1] += 0.1 * np.random.default_rng(0).normal(size=x[0].shape)
     last = grouped(scene, {"simulation": x, "newton-1": late}).roll_outs[1]
-    assert (
-        energy.measure_energy(last)["energy/strain"] > 2.0 * energy.measure_energy(one)["energy/strain"]
-    )
+    strains = [energy.measure_energy(made)["energy/strain"] for made in (one, last)]
+    assert strains[1] > 2.0 * strains[0]
     # What ended in the warm-up has no number.
     ended = grouped(scene, {"newton-1": x[:3]}, suites=("garments",)).roll_outs[0]
     assert measured(ended) == ({}, {}, ("ok", ""))

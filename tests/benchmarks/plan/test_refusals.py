@@ -42,6 +42,8 @@ WORDS = [
     ("--out torn", "torn/run.json: not readable"),
     ("--trained none", "no such folder"),
     ("--trained folder --scheduler tcp://there", "leave out --scheduler"),
+    ("--set device=cuda --scheduler tcp://there", "device: a cluster has the cpu"),
+    ("--rollout mine=back.npz --scheduler tcp://there", "rollouts: a cluster has"),
     ("--methods gone.py", "gone.py: no such file"),
     ("--set metrics=twice.py", "metric 'energy/total' is declared twice, by the project itself and by "),
     ("--set metrics=bare.py", "metric 'mine/x' has no unit"),
@@ -97,6 +99,7 @@ def folder(tmp_path, monkeypatch):
         still = {"poses": np.zeros((frames, 72)), "trans": np.zeros((frames, 3)), "fps": 30}
         np.savez(tmp_path / f"{name}.npz", **still)
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("snug.training.device.find_device", lambda name: None)
     begun = "benchmarks.runner.execute_plan.execute"
     monkeypatch.setattr(begun, lambda *_, **__: pytest.fail("the run was begun"))
     return tmp_path

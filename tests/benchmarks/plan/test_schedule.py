@@ -38,9 +38,8 @@ def test_only_what_trains_depends_on_the_accelerator_and_nothing_on_the_cores(pl
     facts = {"processor": "a processor", "cores": 2, "python": "3", "accelerator": "a GPU"}
     hardware = {"cpu": facts | {"accelerator": None}, "cuda": facts}
     monkeypatch.setattr(provenance, "hardware", lambda device: hardware[device])
-    assert changed(
-        plan, dataclasses.replace(plan, study=dataclasses.replace(plan.study, device="cuda"))
-    ) == {"network"}
+    on_gpu = dataclasses.replace(plan.study, device="cuda")
+    assert changed(plan, dataclasses.replace(plan, study=on_gpu)) == {"network"}
     before = inputs_of(plan)
     monkeypatch.setattr(provenance, "usable_cores", lambda: 7)
     assert inputs_of(plan) == before

@@ -26,7 +26,7 @@ from benchmarks.runner.schedule import tasks_of
 from benchmarks.runner.task import Context, Outcome, failure
 from benchmarks.scene import BuiltScene
 from benchmarks.scenes import SCENES, of_garment
-from reference_sim import Trajectory
+from reference_sim import Trajectory, simulate
 
 TINY = dataclasses.replace(
     find_preset("smoke"), sheet_cells=3, sheet_frames=4, cell_seconds=90.0, repeats=1, least_seconds=0.01
@@ -110,6 +110,13 @@ def prepared(method: str | MethodEntry, scene: BuiltScene, models: Path = Path()
     made = entry.make(models=models, seed=0)
     made.prepare(scene)
     return made
+
+
+def simulated(scene: BuiltScene, **options) -> Trajectory:
+    """The scene as `simulate` has it, from its start on, with these options in place of the scene's."""
+    given = {"dt": scene.dt, "frames": scene.frames, "obstacle": scene.obstacle, "start": scene.start}
+    given |= {"velocity": scene.start_velocity, "pin_positions": scene.pin_positions}
+    return simulate(scene.cloth, scene.energies, **given | options)
 
 
 def trajectory_of(scene: BuiltScene, positions: np.ndarray, **fields) -> Trajectory:

@@ -15,14 +15,11 @@ from pathlib import Path
 import pytest
 
 from benchmarks import run
-from benchmarks.plan.plan import check_machines
-from benchmarks.plan.study import StudyError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner import cluster as scheduler
 from benchmarks.runner import execute_plan as execution
 from benchmarks.runner.task import RunRefused, RunStopped
 from snug.networks.tensor_file import read_tensors
-from tests.benchmarks.plan.planned import study_with
 from tests.benchmarks.runner.processes_by_hand import Dask, alive, chain, finish, task, together, until
 
 pytest.importorskip("distributed")
@@ -88,15 +85,6 @@ def test_where_nobody_answers_and_without_dask_the_remedy_is_said(monkeypatch):
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(RunRefused, match="pip install"):
         scheduler.check_scheduler("tcp://127.0.0.1:1")
-
-
-@pytest.mark.parametrize(
-    ("field", "value"), [("device", "cuda"), ("rollouts", {"mine": {"path": "a.npz"}})]
-)
-def test_what_a_cluster_cannot_do_is_refused(field, value, tmp_path, monkeypatch):
-    monkeypatch.setattr("snug.training.device.find_device", lambda name: None)
-    with pytest.raises(StudyError, match=f"{field}: .*leave out --scheduler"):
-        check_machines(study_with(**{field: value}), tmp_path, "tcp://127.0.0.1:1")
 
 
 @pytest.mark.slow

@@ -20,7 +20,7 @@ from benchmarks.runner.ground_truth import simulate_clips
 from benchmarks.runner.networks import LONGEST, train
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.runner.task import Outcome
-from reference_sim import Trajectory, simulate
+from reference_sim import Trajectory
 from reference_sim.files.array_file import read_arrays
 from snug.motion.library import TRAIN
 from snug.networks.dressed_body import DressedBody
@@ -31,6 +31,7 @@ from tests.benchmarks.runner.tasks_by_hand import (
     context,
     dressed_scene,
     plan_of,
+    simulated,
     training,
 )
 from tests.snug.training.dressing import swaying, tube_dress
@@ -62,12 +63,12 @@ def quickly(monkeypatch):
     """Clips that cost nothing: name -> how it ends otherwise; those that were asked for."""
     odd, asked = {}, []
 
-    def simulated(scene, entry, folder):
+    def quick(scene, entry, folder):
         clip = scene.dressed.motion
         asked.append(clip.name)
         return odd.get(clip.name, still)(clip, entry)
 
-    monkeypatch.setattr(ground_truth, "simulated", simulated)
+    monkeypatch.setattr(ground_truth, "simulated", quick)
     return odd, asked
 
 
@@ -103,10 +104,7 @@ def test_a_clip_is_simulated_as_its_motion_would_be(tmp_path):
     clip, *_ = make_shared_clips([MOTION], 1, vertices=150)
     outcome = clips_of(0, tmp_path, assets, "lbfgs-5")
     scene = dressed_scene(clip.name).build(assets_of(tube_dress(), clip))
-    trajectory = simulate(
-        scene.cloth, scene.energies, dt=scene.dt, frames=scene.frames, obstacle=scene.obstacle,
-        start=scene.start, method="lbfgs", max_iterations=5, finish=False,
-    )  # fmt: skip
+    trajectory = simulated(scene, method="lbfgs", max_iterations=5, finish=False)
     positions = read_arrays(tmp_path / outcome.files[0])[clip.name]
     assert np.array_equal(positions, trajectory.positions.astype(np.float32))
     assert len(positions) == CLIP_FRAMES

@@ -94,9 +94,8 @@ def test_a_network_of_another_processor_is_taken_and_what_is_none_is_refused_in_
     job = training_of(plan_with(tmp_path, "pbns"))
     elsewhere = dataclasses.replace(job, inputs={**job.inputs, "machine": "another"}, key="another")
     assert pretrained_network(elsewhere, made[0])[1] == ""
-    assert pretrained_network(job, tmp_path)[1].startswith(
-        "no pretrained network pbns-tshirt: benchmarks.run"
-    )
+    none = "no pretrained network pbns-tshirt: benchmarks.run"
+    assert pretrained_network(job, tmp_path)[1].startswith(none)
     path = tmp_path / "pbns-tshirt.safetensors"
     path.write_bytes(b"half")
     assert "pbns-tshirt.safetensors: not a safetensors file" in pretrained_network(job, tmp_path)[1]
@@ -117,9 +116,8 @@ def test_a_run_from_files_simulates_and_trains_nothing_but_a_users_own(made, tmp
         "tshirt/untrained-seed0": "training", "tshirt/mine-seed0": "training",
     }  # fmt: skip
     assert "data" not in {task.kind for task in tasks}
-    assert "data" in {
-        task.kind for task in tasks_of(plan_with(tmp_path, "pbns", "supervised", "untrained"))
-    }
+    trained = tasks_of(plan_with(tmp_path, "pbns", "supervised", "untrained"))
+    assert "data" in {task.kind for task in trained}
 
 
 def test_every_row_of_a_pretrained_network_says_so(made, tmp_path):

@@ -87,9 +87,7 @@ def test_rows_of_a_cell_stand_in_each_suite_and_tell_what_is_not_finite():
     cell = Cell(SHEET, find_method("newton-1"), 0, ("garments", "speed"))
     table = rows(cell, RAN, {"energy/strain": 1.0, "distance/rms": np.nan})
     assert [row.suite for row in table] == ["garments"] * 4 + ["speed"] * 4
-    assert {row.dtype for row in table} == {"float64"} and {row.terms for row in table} == {
-        "strain+inertia"
-    }
+    assert {(row.dtype, row.terms) for row in table} == {("float64", "strain+inertia")}
     by_metric = {row.metric: row for row in table}
     assert by_metric["cost/frame"].value == 250.0 and by_metric["cost/peak"].unit == "MB"
     strain, lost = by_metric["energy/strain"], by_metric["distance/rms"]
@@ -104,10 +102,8 @@ def test_rows_of_a_cell_stand_in_each_suite_and_tell_what_is_not_finite():
 def test_inputs_are_added_to_a_methods_own_work_and_percentiles_are_medians_of_repeats():
     cell = Cell(SHEET, find_method("newton-1"), 0, ("speed",))
     outcomes: dict = {("cell", cell.name): RAN}
-    assert set(clock_costs(cell, 3, outcomes)[0]) == {
-        "cost/frame",
-        "cost/peak",
-    }  # as an earlier run wrote it
+    as_earlier_runs_wrote_it = clock_costs(cell, 3, outcomes)[0]
+    assert set(as_earlier_runs_wrote_it) == {"cost/frame", "cost/peak"}
     late = [{"seconds": s, "frame_p95": p} for s, p in ((1.0, 0.3), (1.2, 0.5), (1.1, 0.4))]
     outcomes["cell", cell.name] = dataclasses.replace(
         RAN, result={**RAN.result, **late[0], "inputs": 0.002}
@@ -120,9 +116,8 @@ def test_inputs_are_added_to_a_methods_own_work_and_percentiles_are_medians_of_r
         "failed", "more than one thread", result={"seconds": 9.0}
     )
     costs, remark = clock_costs(cell, 3, outcomes)
-    assert (
-        costs["cost/frame"] == pytest.approx(275.0) and remark == "repeat 2: failed: more than one thread"
-    )
+    assert costs["cost/frame"] == pytest.approx(275.0)
+    assert remark == "repeat 2: failed: more than one thread"
 
 
 def test_an_extreme_case_may_fail_honestly_and_nothing_else_may():
@@ -156,9 +151,8 @@ def test_new_numbers_of_test_motions_are_a_look_and_others_are_none(tmp_path, ca
             [Row("garments", scene, "skinning", 0, "energy/total", "J", value) for value in values]
         )
         config = log.folder.read_config()
-        assert config["scenes"][scene]["role"] == (
-            "test" if scene == "tshirt/dance_turn" else "validation"
-        )
+        roles = {"tshirt/dance_turn": "test", "tshirt/kick": "validation"}
+        assert config["scenes"][scene]["role"] == roles[scene]
         return len(config["test_looks"])
 
     assert looks("tshirt/kick", 1.0) == 0

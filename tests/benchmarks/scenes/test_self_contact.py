@@ -81,9 +81,8 @@ def test_the_option_makes_it_the_ground_truth_of_dressed_scenes(monkeypatch):
         "tshirt/kick": True,
         "flag": False,
     }
-    assert (
-        of_garment("tshirt", plan.motions.worn).scene("walk").self_contact
-    )  # of what networks learn from
+    learned_from = of_garment("tshirt", plan.motions.worn).scene("walk")
+    assert learned_from.self_contact
     of_kick, *_ = (cell for cell in plan.cells if cell.scene.dressed and cell.method == "simulation")
     assert protocol_of(of_kick, plan) == OWN  # another reference than that of the protocol
     without = make_plan(dataclasses.replace(study, self_contact=False))
