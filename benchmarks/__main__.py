@@ -25,13 +25,13 @@ COMMANDS = {
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command that the first word names; without one, list them. Return its exit status."""
-    words = list(sys.argv[1:] if arguments is None else arguments)
-    if not words or words[0] not in COMMANDS:
+    command = list(sys.argv[1:] if arguments is None else arguments)
+    if not command or command[0] not in COMMANDS:
         for name, (module, text) in COMMANDS.items():
             print(f"{name:<14} python -m {module:<23} {text}")
-        return 2 if words and words[0] not in ("-h", "--help") else 0
-    module = COMMANDS[words[0]][0]
-    sys.argv = [f"python -m {module}", *words[1:]]
+        return 2 if command and command[0] not in ("-h", "--help") else 0
+    module = COMMANDS[command[0]][0]
+    sys.argv = [f"python -m {module}", *command[1:]]
     runpy.run_module(module, run_name="__main__", alter_sys=True)
     return 0
 

@@ -193,8 +193,8 @@ def check_method(entry: MethodEntry, scene: BuiltScene, make: Callable[..., Meth
         clock = time.perf_counter()
         return method.run(), time.perf_counter() - clock
 
-    made, seconds = run(seed)
-    x, stated = np.asarray(made.positions, dtype=np.float64), float(np.nansum(made.frame_seconds))
+    answer, seconds = run(seed)
+    x, stated = np.asarray(answer.positions, np.float64), float(np.nansum(answer.frame_seconds))
     bad = np.flatnonzero(~np.isfinite(x).all(axis=(1, 2)))
     changed = [name for name, text in fingerprints(scene).items() if before.get(name) != text]
     near = PLACE_TOLERANCE * max(1.0, np.abs(scene.start).max())
@@ -204,12 +204,12 @@ def check_method(entry: MethodEntry, scene: BuiltScene, make: Callable[..., Meth
             "frame 0 is off the scene's start: put scene.start there, or say gives_first_frame=True"),
         (not pin, f"a pin is off its place in {pin}: "
             "x[cloth.pins] = scene.pin_positions(frame), or the start where that is None"),
-        (entry.other_mesh or np.array_equal(made.faces, scene.cloth.faces),
+        (entry.other_mesh or np.array_equal(answer.faces, scene.cloth.faces),
             "gives other faces than the scene's: give cloth.faces"),
-        (np.shape(made.times) == (len(x),) and np.allclose(made.times, np.arange(len(x)) * scene.dt),
+        (np.shape(answer.times) == (len(x),) and np.allclose(answer.times, np.arange(len(x)) * scene.dt),
             "gives other times than np.arange(frames) * scene.dt"),
-        (not len(bad) or (made.status == "diverged" and made.reason), "has a position that is not finite in "
-            f"frame {bad.min(initial=len(x))}: say status='diverged', and why"),
+        (not len(bad) or (answer.status == "diverged" and answer.reason), "has a position that is not finite "
+            f"in frame {bad.min(initial=len(x))}: say status='diverged', and why"),
         (stated <= CLOCK_SLACK * seconds + PLACE_TOLERANCE, f"its frames say {stated:.3g} s in all, the "
             f"clock {seconds:.3g} s: give frame_seconds in seconds, of run() alone"),
         (not changed, f"alters the scene: {', '.join(changed)}: copy what you change, others read it"),

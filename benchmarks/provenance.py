@@ -232,12 +232,12 @@ def _neighbours(home: Path) -> list[Path]:
     """
     top = _top_of(home)
     installed = top.name in ("site-packages", "dist-packages")
-    found = []
+    paths = []
     for folder, folders, names in os.walk(top / home.relative_to(top).parts[0] if installed else top):
         modules = sorted(name for name in names if name.endswith(".py"))
         folders[:] = sorted(name for name in folders if name.isidentifier()) if modules else []
-        found += [Path(folder, name) for name in modules]
-    return found
+        paths += [Path(folder, name) for name in modules]
+    return paths
 
 
 def _top_of(home: Path) -> Path:

@@ -94,9 +94,9 @@ def publish(name: str, out: Path, into: Path, head: str) -> None:
     print(f"{name}: published in {into / whole.name}", flush=True)
 
 
-def _call(*words: str) -> None:
-    print(shlex.join(words), file=sys.stderr, flush=True)
-    subprocess.run([sys.executable, "-m", *words], check=False)
+def _call(*command: str) -> None:
+    print(shlex.join(command), file=sys.stderr, flush=True)
+    subprocess.run([sys.executable, "-m", *command], check=False)
 
 
 def all_usable(folder: RunFolder) -> bool:

@@ -79,30 +79,30 @@ def clocked(
         with _compilations() as compiled:
             _synchronise()
             busy, clock = time.process_time(), time.perf_counter()
-            made = run()
-            np.add.reduce(np.asarray(of(made)), axis=None)  # what is made only when looked at is made now
+            result = run()
+            np.add.reduce(np.asarray(of(result)), axis=None)  # what is computed when looked at is so now
             _synchronise()
             seconds, busy = time.perf_counter() - clock, time.process_time() - busy
         if first and compiled:
-            first, earlier = False, made
+            first, earlier = False, result
             continue
         first = False
         runs.append(seconds)
         used += busy
-        if earlier is not None and np.may_share_memory(np.asarray(of(earlier)), np.asarray(of(made))):
+        if earlier is not None and np.may_share_memory(np.asarray(of(earlier)), np.asarray(of(result))):
             again = "run() gave again what it had given before: each call of run() has to do all of the "
-            return made, Reading(tuple(runs), again + "work, and to return an array of its own")
+            return result, Reading(tuple(runs), again + "work, and to return an array of its own")
         if sum(runs) >= least or len(runs) == MOST:
             break
-        earlier = made  # held beyond the next run, so that what is new lies elsewhere
+        earlier = result  # held beyond the next run, so that what is new lies elsewhere
     seconds = sum(runs)
     if used > CROWDED * seconds + GRAIN:
         crowd = f"{used:.2f} s of processor time in {seconds:.2f} s: more than one thread has worked: "
         crowd += "leave the number of threads alone: one is set, see OMP_NUM_THREADS"
-        return made, Reading(tuple(runs), crowd)
-    late = _still_at_work(of(made), before, children)
+        return result, Reading(tuple(runs), crowd)
+    late = _still_at_work(of(result), before, children)
     late += ": wait in run() for all threads, processes and devices; leave none behind" if late else ""
-    return made, Reading(tuple(runs), late)
+    return result, Reading(tuple(runs), late)
 
 
 @contextmanager

@@ -30,8 +30,8 @@ class Parser(argparse.ArgumentParser):
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
         """Parse as the base class does. Raises WrongWord also for an empty value, as "$UNSET" leaves one."""
-        words = sys.argv[1:] if args is None else args
-        for before, word in zip(["", *words], words):
+        arguments = sys.argv[1:] if args is None else args
+        for before, word in zip(["", *arguments], arguments):
             if not word.strip(", ") or (word.startswith("--") and word.endswith("=")):
                 self.error(f"{before} '{word}' names nothing: give a value, or leave it out")
         return super().parse_known_args(args, namespace)

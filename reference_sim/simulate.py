@@ -79,18 +79,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     frames = options.frames
     if frames is None:
         frames = obstacle.frames if obstacle is not None and obstacle.frames > 1 else FRAMES_ALONE
-    found = simulate(cloth, terms, dt=options.dt, frames=frames, obstacle=obstacle, progress=path.name)
-    found.save(path)
-    fields = found.frame_fields
+    motion = simulate(cloth, terms, dt=options.dt, frames=frames, obstacle=obstacle, progress=path.name)
+    motion.save(path)
+    fields = motion.frame_fields
     last = [
         f"{name[7:]} {values[-1]:.3g}" for name, values in fields.items() if name.startswith("energy/")
     ]
     print(
-        f"frames     {found.frames} of {frames}, {int(fields['converged'].sum())} converged\n"
-        f"status     {found.status}{found.reason and ': '}{found.reason}\n"
+        f"frames     {motion.frames} of {frames}, {int(fields['converged'].sum())} converged\n"
+        f"status     {motion.status}{motion.reason and ': '}{motion.reason}\n"
         f"energies   {', '.join(last)} J at the last frame\nwrote      {path}"
     )
-    return 0 if found.frames == frames and found.status == "converged" else 1
+    return 0 if motion.frames == frames and motion.status == "converged" else 1
 
 
 def read_cloth(options: argparse.Namespace) -> Cloth:
@@ -111,12 +111,12 @@ def choose_pins(which: str | None, positions: np.ndarray) -> list[int]:
     if which == "top":
         height = positions[:, 1]
         return (height >= height.max() - 0.01 * (height.max() - height.min())).nonzero()[0].tolist()
-    words = [word.strip() for word in which.split(",")]
-    if not all(word.isdecimal() and int(word) < len(positions) for word in words):
+    numbers = [word.strip() for word in which.split(",")]
+    if not all(word.isdecimal() and int(word) < len(positions) for word in numbers):
         raise ValueError(
             f"--pins {which!r}: give 'top', or vertices from 0 to {len(positions) - 1} as '0,9'"
         )
-    return [int(word) for word in words]
+    return [int(word) for word in numbers]
 
 
 def read_obstacle(options: argparse.Namespace) -> Obstacle:

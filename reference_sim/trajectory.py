@@ -203,12 +203,12 @@ def write_obj(path: Path, positions: np.ndarray, faces: np.ndarray, uv: np.ndarr
     uv: (V,2) of the vertices, or (F,3,2) of the corners.
     """
     lines = ["# metres, y up", *(f"v {x!r} {y!r} {z!r}" for x, y, z in positions.tolist())]
-    words = [[f"{vertex}" for vertex in face] for face in (faces + 1).tolist()]
+    polygons = [[f"{vertex}" for vertex in face] for face in (faces + 1).tolist()]
     if uv is not None:
         lines += [f"vt {u!r} {v!r}" for u, v in uv.reshape(-1, 2).tolist()]
         chart = faces if uv.ndim == 2 else np.arange(faces.size).reshape(-1, 3)
-        words = [[f"{v}/{t}" for v, t in zip(*pair)] for pair in zip(words, (chart + 1).tolist())]
-    lines += [" ".join(["f", *face]) for face in words]
+        polygons = [[f"{v}/{t}" for v, t in zip(*pair)] for pair in zip(polygons, (chart + 1).tolist())]
+    lines += [" ".join(["f", *face]) for face in polygons]
     with replacing(path) as temporary:
         temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
 

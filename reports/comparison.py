@@ -419,15 +419,15 @@ def _with_known_zero(run: Run, *frames: pd.DataFrame, basis: pd.DataFrame) -> li
 
     Of energies whose zero is a choice, in scenes whose reference and skinning the basis has.
     """
-    made = []
+    shares = []
     for frame in frames:
         for metric in (metric for metric in run.metrics.values() if metric.arbitrary_zero):
             frame = with_relative_excess(run, frame, metric.name, basis=basis)
             excess = frame[frame["metric"] == relative_metric(metric.name).name]
             covered = frame.set_index(CELL[:3]).index.isin(excess.set_index(CELL[:3]).index)
             frame = frame[~(covered & (frame["metric"] == metric.name))]
-        made.append(frame)
-    return made
+        shares.append(frame)
+    return shares
 
 
 def _metrics(run: Run) -> dict[str, Metric]:

@@ -47,15 +47,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     parser.add_argument("--check", action="store_true", help="write nothing; name documents out of date")
     options = parser.parse_args(arguments)
-    stale = [(path, made) for path, text, made in documents() if made != text]
-    for path, made in stale:
+    stale = [(path, content) for path, text, content in documents() if content != text]
+    for path, content in stale:
         if options.check:
             print(
                 f"{path}: not what the published runs give; run python -m reports.docs", file=sys.stderr
             )
         else:
             with replacing(path) as temporary:
-                temporary.write_text(made, encoding="utf-8", newline="\n")
+                temporary.write_text(content, encoding="utf-8", newline="\n")
             print(path)
     return 1 if stale and options.check else 0
 

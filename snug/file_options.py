@@ -127,30 +127,30 @@ def is_garment_file(word: str) -> bool:
 
 def parse_garment_file(text: str) -> GarmentFile:
     """Return the garment file that FILE[,key=value...] means. Raises ValueError."""
-    path, words = split_words(text)
-    words = {"path": path, **words}
-    if "shift" in words:
-        shift = words["shift"]
-        words["shift"] = tuple(shift) if isinstance(shift, list) else (shift,)
-    return _made(GarmentFile, words, text)
+    path, options = split_words(text)
+    options = {"path": path, **options}
+    if "shift" in options:
+        shift = options["shift"]
+        options["shift"] = tuple(shift) if isinstance(shift, list) else (shift,)
+    return _made(GarmentFile, options, text)
 
 
 def parse_motion_files(text: str) -> tuple[str, MotionFileOptions]:
     """Return the path that PATH[,key=value...] means, and how to read it. Raises ValueError."""
-    path, words = split_words(text)
-    return path, _made(MotionFileOptions, words, text)
+    path, options = split_words(text)
+    return path, _made(MotionFileOptions, options, text)
 
 
-def _made(kind: Any, words: dict[str, Any], text: str) -> Any:
+def _made(kind: Any, options: dict[str, Any], text: str) -> Any:
     known = [field.name for field in fields(kind)]
-    for name in words:
+    for name in options:
         if name not in known:
             raise ValueError(f"{text}: no word is called '{name}'; there are {', '.join(known)}")
     try:
-        for name in {"path", "material"} & words.keys():
-            if not (place := words[name]) or place is True:
+        for name in {"path", "material"} & options.keys():
+            if not (place := options[name]) or place is True:
                 raise ValueError(f"{name}={place}: give a path")
-            words[name] = Path(str(place))
-        return kind(**words)
+            options[name] = Path(str(place))
+        return kind(**options)
     except ValueError as error:
         raise ValueError(f"{text}: {error}") from None

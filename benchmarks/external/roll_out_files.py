@@ -80,14 +80,14 @@ def parse_roll_out(text: str, *, named: bool = True) -> tuple[str, dict[str, Any
     >>> parse_roll_out("mine=out.npz,units=cm,ms=2.2")
     ('mine', {'path': 'out.npz', 'units': 'cm', 'ms': 2.2})
     """
-    given, words = split_words(text)
+    given, options = split_words(text)
     name, equals, path = (part.strip() for part in given.partition("="))
     if not (named or equals):
         stem = Path(given.rstrip("/").replace(PLACE, "")).stem
         name, path = re.sub(rf"[^{CHARACTERS}]+", "-", stem).strip("_-+.") or "roll-out", given
     if not (name and path):
         raise RollOutFileError(f"{text}: give NAME=FILE, with ,units=cm and the like behind it")
-    return name, {"path": path, **words}
+    return name, {"path": path, **options}
 
 
 OVER_TIME = ("positions", "obstacle", "quasi_static")

@@ -174,8 +174,8 @@ class Program(Stored):
             places = {"{scene}": str(exported), "{out}": str(out), "{seed}": str(self.seed)}
             self._execute(places, output)
             if not out.is_file():
-                said = _last_line(output)
-                raise RuntimeError(f"the program has ended well and has not written {{out}}{said}")
+                last_line = _last_line(output)
+                raise RuntimeError(f"the program has ended well and has not written {{out}}{last_line}")
             self.path = str(out)
             super().prepare(self.scene)
             declared = read_arrays(out, ("seconds_per_frame",)).get("seconds_per_frame")
@@ -187,14 +187,14 @@ class Program(Stored):
         return replace(super().run(), provenance=provenance)
 
     def _execute(self, places: dict[str, str], output: Path) -> None:
-        words = shlex.split(self.command)
+        command = shlex.split(self.command)
         for place, path in places.items():
-            words = [word.replace(place, path) for word in words]
+            command = [word.replace(place, path) for word in command]
         environment = {name: value for name, value in os.environ.items() if name not in OWN_ENVIRONMENT}
         with output.open("wb") as stream:
             try:
                 status = subprocess.run(
-                    words, stdin=subprocess.DEVNULL, stdout=stream, stderr=stream, env=environment,
+                    command, stdin=subprocess.DEVNULL, stdout=stream, stderr=stream, env=environment,
                     timeout=self.seconds,
                 ).returncode  # fmt: skip
             except OSError as error:
@@ -208,8 +208,8 @@ class Program(Stored):
 
 def _last_line(output: Path) -> str:
     """Return its last line, behind a colon; empty where it has said nothing."""
-    said = output.read_text("utf-8", "replace").split("\n")
-    last = next((" ".join(line.split()) for line in reversed(said) if line.strip()), "")
+    lines = output.read_text("utf-8", "replace").split("\n")
+    last = next((" ".join(line.split()) for line in reversed(lines) if line.strip()), "")
     return f": {last}" if last else ""
 
 

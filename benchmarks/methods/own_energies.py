@@ -39,8 +39,8 @@ def energies_of(training: Training) -> Recipe | None:
     recipe, kind = training.recipe, KINDS[training.kind]
     if not (kind.physics and set(recipe.terms) >= NEEDED):
         return None
-    own = replace(DEFAULT, **{option: getattr(recipe, option) for option in OPTIONS})
-    return without_inertia(own) if kind.static else own
+    energies = replace(DEFAULT, **{option: getattr(recipe, option) for option in OPTIONS})
+    return without_inertia(energies) if kind.static else energies
 
 
 def own_energies(entry: MethodEntry) -> Recipe | None:
@@ -67,18 +67,18 @@ def own_reference(entry: MethodEntry) -> MethodEntry | None:
     Nor is there one of the scene's energies without inertia: the quasi-static solution of the scene is
     that.
     """
-    own = own_energies(entry)
-    if own in (None, DEFAULT, STATIC) or is_own_reference(entry):
+    energies = own_energies(entry)
+    if energies in (None, DEFAULT, STATIC) or is_own_reference(entry):
         return None
-    recipes = (training.recipe for training in TRAININGS.values() if energies_of(training) == own)
+    recipes = (training.recipe for training in TRAININGS.values() if energies_of(training) == energies)
     name = next((recipe.name for recipe in recipes), f"of-{entry.trained}")
-    static = "inertia" not in own.terms
+    static = "inertia" not in energies.terms
     return MethodEntry(
         name=f"simulation-{name}" + "-at-rest" * static,
         label=f"Simulation, {name.replace('-', ' ').replace('pbns', 'PBNS')}" + ", at rest" * static,
         description=f"{'quasi-static solutions' if static else 'the reference'} with the energies of {name}",
         module=MODULE,
-        options={option: getattr(own, option) for option in OPTIONS},
+        options={option: getattr(energies, option) for option in OPTIONS},
         needs_body=True,
         timed=False,
         role="ablation",

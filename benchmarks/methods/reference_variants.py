@@ -27,9 +27,9 @@ def of_own_energies(scene: BuiltScene, recipe: Recipe) -> BuiltScene:
     Self-contact, which is no energy of a recipe, stays.
     """
     contact = (make_contact(scene.cloth, recipe),) * (scene.obstacle is not None)
-    own = *static_terms(scene.cloth, recipe).values(), *contact
+    terms = *static_terms(scene.cloth, recipe).values(), *contact
     further = scene.minimised[len(scene.energies) :]
-    return replace(scene, energies=own, minimised=own + further, settle=lambda: scene.start_state)
+    return replace(scene, energies=terms, minimised=terms + further, settle=lambda: scene.start_state)
 
 
 def of_perturbed_start(scene: BuiltScene, shift: float) -> BuiltScene:

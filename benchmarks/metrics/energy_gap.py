@@ -147,8 +147,8 @@ def optimality(
             return numbers
         below = minimiser.minimise(x)
         # A guess that has no energy, as of a garment that collapsed a frame ago, leads nowhere.
-        found = (minimiser.minimise(guess).energy, below.energy, here)
-        best = min(energy for energy in found if np.isfinite(energy))
+        minima = (minimiser.minimise(guess).energy, below.energy, here)
+        best = min(energy for energy in minima if np.isfinite(energy))
         values["gap/energy"].append(here - best)
         values["gap/local"].append(here - min(here, below.energy))
         largest = float(np.abs(gradient[scene.cloth.free]).max())

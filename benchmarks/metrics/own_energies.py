@@ -31,15 +31,15 @@ NAME = "own_excess/total"
 
 def measure(roll_out: RollOut) -> dict[str, float]:
     """Return the excess where the energies are not the scene's; 0 of what is a minimiser of its own ones."""
-    group, own = roll_out.group, own_energies(roll_out.entry)
+    group, recipe = roll_out.group, own_energies(roll_out.entry)
     bare = group.scene.skinned
     if bare is not None and (roll_out is group.reference or is_own_reference(roll_out.entry)):
         return {NAME: 0.0}
-    least = None if own in (None, DEFAULT) else _least(roll_out, own)
-    if bare is None or own is None or least is None:
+    least = None if recipe in (None, DEFAULT) else _least(roll_out, recipe)
+    if bare is None or recipe is None or least is None:
         return {}
-    terms = energy_series(_scene_of(group.scene, own), [roll_out.positions, least, bare])
-    series = [of["total"] if "inertia" in own.terms else of["total"] - of["inertia"] for of in terms]
+    terms = energy_series(_scene_of(group.scene, recipe), [roll_out.positions, least, bare])
+    series = [of["total"] if "inertia" in recipe.terms else of["total"] - of["inertia"] for of in terms]
     return _share(series, roll_out.judged_beside(least))
 
 
@@ -58,13 +58,13 @@ def _scene_of(scene: BuiltScene, recipe: Recipe) -> BuiltScene:
     return of_own_energies(scene, recipe)
 
 
-def _least(roll_out: RollOut, own: Recipe) -> Positions | None:
+def _least(roll_out: RollOut, recipe: Recipe) -> Positions | None:
     """Return the minimiser (T,V,3) [m] of these energies; None where no simulation of them has ended well."""
-    if own == STATIC:
+    if recipe == STATIC:
         return roll_out.group.quasi_static
     entry = own_reference(roll_out.entry)
-    found = (other for other in roll_out.group.roll_outs if entry and other.entry.name == entry.name)
-    return next((other.positions for other in found if other.status in USABLE), None)
+    others = (other for other in roll_out.group.roll_outs if entry and other.entry.name == entry.name)
+    return next((other.positions for other in others if other.status in USABLE), None)
 
 
 def _of_skinning(group: SceneRollOuts) -> Floats | None:

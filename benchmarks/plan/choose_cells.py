@@ -130,18 +130,18 @@ def scenes_of_parts(read: ReadStudy) -> dict[str, list[str]]:
 
 def expanded(patterns: Sequence[str], motions: Motions) -> list[str]:
     """Return the patterns of a part with garment and motions of a run in their places."""
-    found = []
+    expansions = []
     for pattern in patterns:
         pattern = pattern.replace("{garment}", motions.first_garment)
         if not (place := PLACES.search(pattern)):
-            found.append(pattern)
+            expansions.append(pattern)
             continue
         garment = pattern.partition("/")[0].removeprefix("!")
         names = motions.measured_of(garment) if place[1] == "motion" else motions.dynamic_measured
         if place[2]:
             names = names[int(place[2]) - 1 : int(place[2])]
-        found += [pattern.replace(place[0], name) for name in names]
-    return found
+        expansions += [pattern.replace(place[0], name) for name in names]
+    return expansions
 
 
 def _timed_once(cells: Sequence[Cell]) -> list[Cell]:
@@ -168,8 +168,8 @@ def _cases(study: Study, cases: Sequence[Case]) -> Iterator[Case]:
     for case in cases:
         part = study.parts.get(case.suite, Part())
         sets = {"{smoke}": case.smoke and not case.long, "{short}": not case.long}
-        words = [case.name if sets.get(word) else word for word in part.cases]
-        if part.cases and matching([case.name], study.scenes or words):
+        names = [case.name if sets.get(word) else word for word in part.cases]
+        if part.cases and matching([case.name], study.scenes or names):
             yield case
 
 
@@ -177,8 +177,8 @@ def _check_words(read: ReadStudy) -> None:
     """Raise StudyError for a word of a field that nothing has as its name."""
     study, methods, cases = read.study, list(read.methods), [case.name for case in read.cases]
 
-    def check(field: str, known: Sequence[str], words: Iterable[str]) -> None:
-        for word in words:
+    def check(field: str, known: Sequence[str], names: Iterable[str]) -> None:
+        for word in names:
             if not matching(known, [word.removeprefix("!")]):
                 what, hint = field.rpartition(".")[2].removesuffix("s"), ""
                 if what == "scene" and "/" in word:

@@ -116,13 +116,13 @@ def _tables(options: argparse.Namespace) -> Iterator[Table]:
         if not value:
             continue
         if field == "garment":
-            path, words = split_words(value)
-            value = {"path": path, **words}
+            path, fields = split_words(value)
+            value = {"path": path, **fields}
         elif field == "motions":
             paths = list(map(split_words, value))
             value = [path for path, _ in paths]
-            if words := {name: word for _, given in paths for name, word in given.items()}:
-                yield option("motion_files", words)
+            if fields := {name: word for _, given in paths for name, word in given.items()}:
+                yield option("motion_files", fields)
         elif field == "rollouts":
             value = dict(map(parse_roll_out, value))
         elif field not in SINGLE:

@@ -64,20 +64,20 @@ def declarations_of(study: Study) -> tuple[Study, list[Scene], list[MethodEntry]
     Raises:
         DeclarationError: a file that cannot be read, or declares none.
     """
-    found: dict[Kind, list[Any]] = {SCENES: [], METHODS: [], CASES: []}
+    declared: dict[Kind, list[Any]] = {SCENES: [], METHODS: [], CASES: []}
 
     def named(of: Study | Part, suite: str = "") -> Any:
         changes: dict[str, Any] = {}
         for field, kind in ((field, kind) for field, kind in OF_FIELD.items() if hasattr(of, field)):
             changes[field], entries = resolve(kind, getattr(of, field))
             entries = [replace(case, suite=suite) for case in entries] if kind is CASES else entries
-            found[kind] += [entry for entry in entries if entry not in found[kind]]
+            declared[kind] += [entry for entry in entries if entry not in declared[kind]]
         return replace(of, **changes)
 
     parts = {name: named(part, name) for name, part in study.parts.items()}
     study = replace(named(study), parts=parts)
-    check_networks(found[METHODS])
-    return study, found[SCENES], found[METHODS], found[CASES]
+    check_networks(declared[METHODS])
+    return study, declared[SCENES], declared[METHODS], declared[CASES]
 
 
 def check_networks(entries: Sequence[MethodEntry]) -> None:

@@ -101,8 +101,8 @@ class RunFolder:
         """Return those of these files that are not as the run wrote them: name -> gone or damaged."""
         paths = {name: self.path / name for name in digests}
         gone = {name: "gone" for name, path in paths.items() if not path.is_file()}
-        there = {name: digest_of_file(path) for name, path in paths.items() if name not in gone}
-        return gone | {name: "damaged" for name, now in there.items() if now != digests[name]}
+        present = {name: digest_of_file(path) for name, path in paths.items() if name not in gone}
+        return gone | {name: "damaged" for name, now in present.items() if now != digests[name]}
 
     def write_rows(self, rows: Iterable[Row]) -> None:
         """Write results.csv whole or not at all."""
@@ -151,7 +151,8 @@ def write_frame_energies(folder: RunFolder, rows: Iterable[Row]) -> None:
         if row.suite == "garments" and row.part == "whole" and row.role in ROLES
         if row.metric == "energy/total" and row.value is not None
     )
-    curves = {cell: made for cell in cells if SECONDS in (made := _curves(folder.curves_path(*cell)))}
+    curves = {cell: _curves(folder.curves_path(*cell)) for cell in cells}
+    curves = {cell: energies for cell, energies in curves.items() if SECONDS in energies}
     terms = list(
         dict.fromkeys(name for energies in curves.values() for name in energies if name != SECONDS)
     )

@@ -41,12 +41,13 @@ def timed(method: Method, least: float) -> tuple[Trajectory, Reading, list[np.nd
     frames = []
 
     def run() -> Trajectory:
-        made = method.run()
-        frames.append(made.frame_seconds)
-        return made
+        trajectory = method.run()
+        frames.append(trajectory.frame_seconds)
+        return trajectory
 
-    made, reading = clocked(run, of=lambda made: made.positions, least=least)
-    return made, reading, frames[-len(reading.runs) :]  # a first run that compiled is not among them
+    trajectory, reading = clocked(run, of=lambda trajectory: trajectory.positions, least=least)
+    # A first run that compiled is not among them.
+    return trajectory, reading, frames[-len(reading.runs) :]
 
 
 def times(cell: Cell, reading: Reading, frames: list[np.ndarray]) -> dict[str, float]:
@@ -127,7 +128,7 @@ def compute_cell(cell: Cell, least: float, context: Context) -> Outcome:
 def time_batch(cell: Cell, least: float, context: Context, needed: Needed) -> Outcome:
     """Return the time of many bodies at once, by the method that this process has run."""
     method = context.memo.get("method") or prepared_method(cell, context)
-    positions, reading = clocked(method.batch(BATCH), of=lambda made: made, least=least)
+    positions, reading = clocked(method.batch(BATCH), of=lambda positions: positions, least=least)
     seconds = reading.seconds / (positions.shape[0] * positions.shape[1])
     result = {"seconds": seconds, "complaint": reading.complaint}
     if reading.complaint:
@@ -177,7 +178,7 @@ def clocked_inputs(method: Method, scene: BuiltScene, *, least: float) -> Readin
         return np.zeros(1)
 
     make(0)  # whatever is loaded or compiled at first
-    _, reading = clocked(all_frames, of=lambda made: made, least=least)
+    _, reading = clocked(all_frames, of=lambda images: images, least=least)
     return replace(reading, runs=tuple(seconds / frames for seconds in reading.runs))
 
 

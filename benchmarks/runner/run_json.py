@@ -88,10 +88,10 @@ class RunLog:
             self.config["stages"].append({"name": name, "seconds": seconds})
             self.folder.write_config(self.config)
 
-    def open_assets(self, made: Assets | None = None) -> Assets:
+    def open_assets(self, opened: Assets | None = None) -> Assets:
         """Body, garments and motions of the dressed scenes. Raises ValueError where one cannot be made."""
         with self.stage("body, garments and motions"):
-            assets = made or self.plan.open_assets()
+            assets = opened or self.plan.open_assets()
         self.config["garments"] = {
             name: {"vertices": len(g.rest_positions), "material": dataclasses.asdict(g.material)}
             for name, g in assets.garments.items()

@@ -45,26 +45,26 @@ def bent_strip(
     family: str, weight: float, load: float, columns: int = COLUMNS
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the chord of the strip and of the elastica, (width, height) each, over the length."""
-    made = clamped_strip(family, columns, 1.0, ELASTICA_MATERIAL)
-    cloth, length = made.cloth, made.length
-    acceleration = weight * made.stiffness / length**3 / ELASTICA_MATERIAL.areal_density
+    strip = clamped_strip(family, columns, 1.0, ELASTICA_MATERIAL)
+    cloth, length = strip.cloth, strip.length
+    acceleration = weight * strip.stiffness / length**3 / ELASTICA_MATERIAL.areal_density
     terms: list[energies.Energy] = [energies.StretchStVK(cloth), energies.BendHinge(cloth)]
     if weight:
         terms.append(energies.Gravity(cloth, acceleration=acceleration))
     if load:
         forces = np.zeros_like(cloth.rest_positions)
-        share = cloth.vertex_areas[made.tip] / cloth.vertex_areas[made.tip].sum()
-        forces[made.tip, 1] = -load * made.stiffness / length**2 * made.width * share
+        share = cloth.vertex_areas[strip.tip] / cloth.vertex_areas[strip.tip].sum()
+        forces[strip.tip, 1] = -load * strip.stiffness / length**2 * strip.width * share
         terms.append(DeadLoad(cloth, forces))
     s, (x, drop) = exact_elastica(weight, load)
     rest = cloth.rest_positions
     guess = rest.copy()  # on the elastica: near the answer, not it
-    free = rest[:, 0] > made.cell
+    free = rest[:, 0] > strip.cell
     guess[free, 0] = np.interp(rest[free, 0], s, x)
     guess[free, 1] = -np.interp(rest[free, 0], s, drop)
-    strength = (weight + load) * made.stiffness / ELASTICA_MATERIAL.areal_density / 9.81
+    strength = (weight + load) * strip.stiffness / ELASTICA_MATERIAL.areal_density / 9.81
     bent = minimum(terms, guess, tolerance=1e-6 * strength)
-    return made.chord(bent) / length, np.array([x[-1], drop[-1]])
+    return strip.chord(bent) / length, np.array([x[-1], drop[-1]])
 
 
 @ELASTICA(

@@ -114,11 +114,11 @@ class ContactBarrier(Energy):
 
     def _hessian(self, x: np.ndarray, projection: str) -> sp.csc_matrix:
         """Return (3V, 3V), with the negative eigenvalues of each pair or without; kept while x stays."""
-        found = self.pairs(x)
-        if self._hessians_of is not found:
-            self._hessians_of, self._hessians = found, {}
+        neighbours = self.pairs(x)
+        if self._hessians_of is not neighbours:
+            self._hessians_of, self._hessians = neighbours, {}
         if projection not in self._hessians:
-            pairs, positions = found
+            pairs, positions = neighbours
             method = getattr(self.package.PSDProjectionMethod, projection)
             self._hessians[projection] = self.potential.hessian(pairs, self.mesh, positions, method)
         return self._hessians[projection]

@@ -75,10 +75,10 @@ class Energy:
     def __init_subclass__(cls, **options: Any) -> None:
         """Raise TypeError for a definition of its own that would inherit the closed forms of another."""
         super().__init_subclass__(**options)
-        own = vars(cls)
-        if {"element_energy", "power"}.isdisjoint(own):
+        attributes = vars(cls)
+        if {"element_energy", "power"}.isdisjoint(attributes):
             return
-        inherited = [name for name in DERIVATIVES if name not in own]
+        inherited = [name for name in DERIVATIVES if name not in attributes]
         if foreign := [name for name in inherited if getattr(cls, name) is not getattr(Energy, name)]:
             lines = "; ".join(f"{name} = Energy.{name}" for name in foreign)
             raise TypeError(f"{cls.__name__} would inherit closed forms of another energy: write {lines}")

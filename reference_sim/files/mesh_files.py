@@ -69,15 +69,15 @@ def _read_obj(path: Path) -> Contents:
     uv_polygons: list[list[int]] = []
     with open(path, encoding="utf-8", errors="replace") as file:
         for number, line in enumerate(file, start=1):
-            kind, *words = line.partition("#")[0].split() or [""]
+            kind, *fields = line.partition("#")[0].split() or [""]
             try:
                 if kind == "v":
-                    x, y, z = words[:3]  # colours may follow
+                    x, y, z = fields[:3]  # colours may follow
                     points.append([float(x), float(y), float(z)])
                 elif kind == "vt":
-                    uv.append([float(words[0]), float(words[1]) if len(words) > 1 else 0.0])
+                    uv.append([float(fields[0]), float(fields[1]) if len(fields) > 1 else 0.0])
                 elif kind == "f":
-                    corners = [[*word.split("/"), ""] for word in words]
+                    corners = [[*word.split("/"), ""] for word in fields]
                     polygons.append([_counted(c[0], len(points)) for c in corners])
                     uv_polygons.append([_counted(c[1], len(uv)) if c[1] else -1 for c in corners])
             except (ValueError, IndexError):

@@ -96,11 +96,11 @@ def means(frame: pd.DataFrame, *keys: str) -> pd.Series:
             groups[key].append(line)
         else:
             failed[end(key)].add(line.seed)
-    made = [_mean(lines, len(asked[place(key)]), failed[end(key)]) for key, lines in groups.items()]
+    values = [_mean(lines, len(asked[place(key)]), failed[end(key)]) for key, lines in groups.items()]
     index = pd.MultiIndex.from_arrays(
         [list(column) for column in zip(*groups)] or [[]] * len(names), names=names
     )
-    return pd.Series(made, index=index, dtype=object)
+    return pd.Series(values, index=index, dtype=object)
 
 
 def _mean(lines: Sequence[Any], scenes: int, failed: Set[int]) -> Mean:

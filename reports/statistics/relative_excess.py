@@ -93,11 +93,11 @@ def with_relative_excess(
             parts.append((place, value, share * uncertainty, moved))
     if not parts:
         return rows
-    made = lines.loc[[place for place, *_ in parts]].assign(
+    excesses = lines.loc[[place for place, *_ in parts]].assign(
         metric=relative_metric(metric).name, unit="%", value=[value for _, value, *_ in parts],
         uncertainty=[uncertainty for *_, uncertainty, _ in parts], moved=[moved for *_, moved in parts],
     )  # fmt: skip
-    return pd.concat([rows, made[rows.columns]], ignore_index=True)
+    return pd.concat([rows, excesses[rows.columns]], ignore_index=True)
 
 
 def _values(rows: pd.DataFrame, metric: str, methods: Sequence[str]) -> dict[str, dict[str, float]]:
@@ -178,11 +178,11 @@ def excess_of(run: Run, rows: pd.DataFrame, method: str) -> Excess | None:
         return None
     motions = {scene for scene, _ in one.cells}
     totals = _values(rows, TOTAL, [method, run.reference, SKINNING])
-    own, skinning = (
+    excess, skinning = (
         sum(totals[scene][name] - totals[scene][run.reference] for scene in motions)
         for name in (method, SKINNING)
     )
-    return Excess(effect(one, zero, EXCESS), one.cells, 100.0 * own / skinning, one.fewer)
+    return Excess(effect(one, zero, EXCESS), one.cells, 100.0 * excess / skinning, one.fewer)
 
 
 def own_excess_of(run: Run, rows: pd.DataFrame, method: str) -> Effect | None:

@@ -66,9 +66,9 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     with_excess = with_relative_excess(run, rows_of_garment)
     excess = {name: excess_of(run, with_excess, name) for name in chosen if name != run.reference}
     faster = {name: _times_faster(run, timed, name) for name in chosen}
-    own = {name: own_excess_of(run, rows_of_garment, name) for name in excess}
+    own_excess = {name: own_excess_of(run, rows_of_garment, name) for name in excess}
     shares: dict[str, tuple[Cell, Cell, Cell]] = {
-        name: (own[name], of.effect, of.pooled) for name, of in excess.items() if of
+        name: (own_excess[name], of.effect, of.pooled) for name, of in excess.items() if of
     }
     shares |= {run.reference: (0.0, 0.0, 0.0)} if shares else {}
     lines: list[tuple[Cell, ...]] = [

@@ -27,7 +27,7 @@ def metric_tables(run: Run, only: str = "") -> list[Table]:
     """
     declared = dict.fromkeys(metric.table for metric in run.metrics.values() if metric.table)
     names = [name for name in declared if only in ("", name)]
-    return [made for name in names for made in _by_garment(run, name) or _by_scene(run, name)]
+    return [table for name in names for table in _by_garment(run, name) or _by_scene(run, name)]
 
 
 def _by_garment(run: Run, name: str) -> list[Table]:

@@ -89,8 +89,8 @@ def published_part(request: str) -> str:
     }
     if kind not in forms:
         raise ValueError(f"no part is generated from '{request}'; known: {', '.join((*forms, *PARTS))}")
-    made = forms[kind]()
-    return made if isinstance(made, str) else markdown_table(made)
+    content = forms[kind]()
+    return content if isinstance(content, str) else markdown_table(content)
 
 
 def _words(text: str) -> list[str]:
@@ -233,21 +233,21 @@ def _overview(folders: Sequence[Path], wanted: Sequence[str], methods: Sequence[
     heads: list[str] = []
     rows: dict[str, list[str]] = {}
     for run in map(read_published, folders):
-        own = [name for name in methods if name in run.methods and name not in rows]
-        heads, *lines = text_rows(run, overview(run, own)[0], wanted)
-        rows |= dict(zip(run.ordered(own), lines))
+        chosen = [name for name in methods if name in run.methods and name not in rows]
+        heads, *lines = text_rows(run, overview(run, chosen)[0], wanted)
+        rows |= dict(zip(run.ordered(chosen), lines))
     return [heads, *(rows[name] for name in methods)]
 
 
 def _table(folder: Path, name: str, wanted: Sequence[str], methods: Sequence[str]) -> str:
     """Return a table of a run with its caption: these columns and methods, all where none is named."""
-    run, made = read_published(folder), _made(folder, name)
-    place = next((place for place, column in enumerate(made.columns) if column.method), 0)
-    lines = [row for row in made.rows if not methods or row[place] in methods]
+    run, table = read_published(folder), _made(folder, name)
+    place = next((place for place, column in enumerate(table.columns) if column.method), 0)
+    lines = [row for row in table.rows if not methods or row[place] in methods]
     if absent := set(methods) - {str(row[place]) for row in lines}:
         raise KeyError(f"{name} of {folder.name}: {', '.join(sorted(absent))}")
-    rows = text_rows(run, replace(made, rows=tuple(lines)), wanted)
-    return f"{markdown_table(rows)}\n\n{' '.join(filter(None, [made.caption, remarks_on(rows)]))}"
+    rows = text_rows(run, replace(table, rows=tuple(lines)), wanted)
+    return f"{markdown_table(rows)}\n\n{' '.join(filter(None, [table.caption, remarks_on(rows)]))}"
 
 
 @cache
@@ -255,10 +255,10 @@ def _made(folder: Path, name: str) -> Table:
     """Return a table of a run: metrics declare many, others have the name of the function that makes them."""
     run = read_published(folder)
     makers = {make.__name__: make for make in TABLES}
-    made = makers[name](run) if name in makers else metric_tables(run, name)
-    if not made:
+    tables = makers[name](run) if name in makers else metric_tables(run, name)
+    if not tables:
         raise KeyError(f"table {name} of {folder.name}")
-    return made[0]
+    return tables[0]
 
 
 ALL = 10_000  # frames or more: whole motions

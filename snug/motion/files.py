@@ -84,8 +84,8 @@ def _first(arrays: Mapping[str, np.ndarray], names: tuple[str, ...], meaning: st
     for name in names:
         if name in arrays:
             return name
-    found = ", ".join(sorted(arrays)) or "none that is known"
-    raise MotionError(f"no array '{names[0]}' (found {found}); give {meaning}")
+    known = ", ".join(sorted(arrays)) or "none that is known"
+    raise MotionError(f"no array '{names[0]}' (found {known}); give {meaning}")
 
 
 def _triples(arrays: Mapping[str, np.ndarray], name: str, frames: int = 0) -> np.ndarray:

@@ -215,8 +215,8 @@ class PhysicsLoss:
         self._definitions = compiled(self._defined, device)
         self._batches: dict[str, BatchKernel] = {}
         if kernels:
-            made = {name: fast_kernel(term, "training_batch") for name, term in self.static.items()}
-            self._batches = {name: kernel for name, kernel in made.items() if kernel is not None}
+            batches = {name: fast_kernel(term, "training_batch") for name, term in self.static.items()}
+            self._batches = {name: kernel for name, kernel in batches.items() if kernel is not None}
             if slow := [term for name, term in self.static.items() if name not in self._batches]:
                 instead = (
                     "frames are evaluated one after the other, or by torch (docs/extend.md, An energy)"
