@@ -29,11 +29,11 @@ PROGRAM = "benchmarks.score"
 MEASURED_BESIDE = ("simulation", "skinning")  # relative excess is the share of skinning's
 SOLVED_AGAIN = "speed"  # the part in which steps are solved again: gaps and one-step errors
 NO_REFERENCE = (
-    "left out by --no-reference: curvature error and histogram, distances, dynamics, relative energy gap"
+    "left out by --no-reference: distances of curvature and position, dynamics, relative energy gap"
 )
 SUMMARY_METRICS = (
     "energy/total", "energy/strain", "energy/bending", "energy/bending_printed", "gap/energy",
-    "curvature/mean", "curvature/error", "penetration/surface", "distance/rms", "surface/chamfer",
+    "curvature/mean", "curvature/histogram", "penetration/surface", "distance/rms", "surface/chamfer",
     "surface/normals",
 )  # fmt: skip
 EXAMPLES = """examples:

@@ -16,7 +16,7 @@ import pandas as pd
 from reports.figures.charts import energy_series, error_of_page_one
 from reports.figures.plotting import Figure, Picture
 from reports.finished_run import Run
-from reports.pictures import failures, side_by_side
+from reports.pictures import side_by_side
 from reports.tables.table import Table
 
 ROWS, COLUMNS = 12, 9  # of a printed table; columns of numbers; the CSV has all
@@ -81,14 +81,17 @@ class TableBlock:
 
 
 BLOCKS: tuple[Heading | Figure | TableBlock, ...] = (
+    TableBlock("paper_table_1"),
+    TableBlock("paper_table_2", most=24),
     Figure("frames", side_by_side),
     Figure("error_against_time", error_of_page_one),
     TableBlock("overview"),
     TableBlock("reference_uncertainty"),
     Heading("The paper's tables"),
     TableBlock("energies"),
-    TableBlock("paper_table_1"),
+    TableBlock("table_1"),
     TableBlock("curvature"),
+    TableBlock("table_2", most=24),
     TableBlock("cost"),
     Heading("Findings"),
     TableBlock("relative_excess"),
@@ -98,8 +101,6 @@ BLOCKS: tuple[Heading | Figure | TableBlock, ...] = (
     TableBlock("ablation_effects"),
     Heading("Error against run time"),
     TableBlock("error_rivals"),
-    Heading("Behind the means"),
-    Figure("failures", failures),
     Heading("Dynamics"),
     TableBlock("dynamics"),
     Figure("energy_series", energy_series),

@@ -21,7 +21,7 @@ from reports.blocks import BLOCKS, ROWS, Heading, Report, TableBlock
 from reports.figures.plotting import Figure, Picture, printable
 from reports.finished_run import Run
 from reports.sentences import headline
-from reports.tables.table import DASH, CellText, Column, Table, column_texts, remarks_below
+from reports.tables.table import CellText, Column, Table, column_texts, remarks_below
 
 # Of run.json, which has all.
 SHOWN = (
@@ -75,12 +75,10 @@ def lay_out_table(run: Run, table: Table) -> Values:
     heads = [place for place, column in enumerate(table.columns) if column.name in table.grouped_by]
     places = [place for place in range(len(table.columns)) if place not in heads]
     columns = [table.columns[place] for place in places]
-    cells = []
-    for rank, (place, column) in enumerate(zip(places, columns)):
-        printed = [
-            label if rank == 0 else texts.get(column.name, DASH) for label, texts in table.references
-        ]
-        cells.append(column_texts(run, column, [row[place] for row in table.rows], printed))
+    cells = [
+        column_texts(run, column, [row[place] for row in table.rows])
+        for place, column in zip(places, columns)
+    ]
     lines = [list(line) for line in zip(*cells)]
     groups: dict[str, list[list[CellText]]] = {}
     for row, line in zip(table.rows, lines):
@@ -94,7 +92,6 @@ def lay_out_table(run: Run, table: Table) -> Values:
             for column, width in zip(columns, _widths(columns))
         ],
         "groups": [{"title": title, "rows": rows} for title, rows in groups.items()],
-        "references": lines[len(table.rows) :],
         "breakable": len(table.rows) > ROWS,
     }
 

@@ -1,4 +1,4 @@
-"""Pictures of garments: methods side by side at one frame, and the worst failures.
+"""Pictures of garments: methods side by side at one frame.
 
 They are drawn on the processor, by a depth buffer: no OpenGL is needed, whose drivers kill the process
 where there is no display, and the same machine gives the same bytes.
@@ -6,7 +6,6 @@ where there is no display, and the same machine gives the same bytes.
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
@@ -17,7 +16,6 @@ import pandas as pd
 from reference_sim.trajectory import Trajectory
 from reports.figures.plotting import DOTS, PAGE_WIDTH, Drawing, file_name, leading, new_figure, wrapped
 from reports.finished_run import Run, shown_seeds
-from reports.statistics.outcomes import overstretched
 from reports.tables.table import number
 
 if TYPE_CHECKING:
@@ -144,11 +142,10 @@ def _covered(corners: np.ndarray, w: int, h: int) -> tuple[np.ndarray, np.ndarra
     return y * w + x, seen[triangle], np.stack([weight[kept] for weight in weights], axis=1)
 
 
-INERTIA, STRAIN = "energy/inertia", "energy/strain"
+INERTIA = "energy/inertia"
 MOST_SIDE_BY_SIDE = 6  # methods side by side
 FRONT = -25.0  # turn of the camera [degrees]
 LINE = 0.18  # inches for a line of text
-MOST_FAILURES, OF_ONE = 4, 2  # failures that are shown, and how many of them by one method
 
 
 @dataclass(frozen=True)
@@ -217,58 +214,19 @@ def draw_side_by_side(run: Run, roll_outs: SceneRollOuts, methods: Sequence[str]
     return Drawing(figure, f"frames_{file_name(roll_outs.scene)}", caption, vector=False)
 
 
-def failures(run: Run) -> Iterator[Drawing]:
-    """Draw trained networks with most strain over the simulation's, where their roll-outs are on disk."""
-    wide = PAGE_WIDTH / MOST_FAILURES
-    tile = (wide, 1.1 * wide)
-    images: list[np.ndarray] = []
-    heads, below = [], []
-    shown: Counter[str] = Counter()
-    for method, scene, strain, ratio in overstretched(run):
-        if len(images) == MOST_FAILURES or shown[method] == OF_ONE:
-            continue
-        roll_outs = read_scene(run, run.frame[run.frame["scene"] == scene], [method])
-        if cloth := roll_outs.series.get(method):
-            images += shots(roll_outs, [method], worst_frame(cloth), tile)
-            name = f"{run.label(method)}: {scene.rpartition('/')[2]}"
-            heads.append(wrapped(name, round(14 * wide)))
-            below.append(f"{number(strain)} J of strain,\n{number(ratio)} × the simulation's")
-            shown[method] += 1
-    if images:
-        caption = (
-            "The worst of trained networks by strain over the simulation's: each at its worst frame."
-        )
-        yield Drawing(sheet(images, tile, heads, below), "failures", caption, vector=False)
-
-
-def worst_frame(cloth: Trajectory) -> int:
-    """Return the frame with most strain, the last where the strain is unknown."""
-    strain = cloth.frame_fields.get(STRAIN)
-    return cloth.frames - 1 if strain is None else int(np.argmax(np.nan_to_num(strain[: cloth.frames])))
-
-
-def sheet(
-    images: Sequence[np.ndarray],
-    tile: tuple[float, float],
-    heads: Sequence[str],
-    below: Sequence[str] = (),
-) -> Figure:
-    """Compose pictures in a row, each of `tile` [inches], with texts over and below them."""
+def sheet(images: Sequence[np.ndarray], tile: tuple[float, float], heads: Sequence[str]) -> Figure:
+    """Compose pictures in a row, each of `tile` [inches], with texts over them."""
     wide, high = tile
-    top, under = (
-        LINE * max((text.count("\n") + 1 for text in texts), default=0) for texts in (heads, below)
-    )
-    width, height = wide * len(images), top + high + under
+    width = wide * len(images)
+    height = LINE * max(text.count("\n") + 1 for text in heads) + high
     figure = new_figure(width, height)
     figure.set_layout_engine("none")
     for place, image in enumerate(images):
-        axes = figure.add_axes((place * wide / width, under / height, wide / width, high / height))
+        axes = figure.add_axes((place * wide / width, 0.0, wide / width, high / height))
         axes.imshow(image, interpolation="none")
         axes.set_axis_off()
         middle = (place + 0.5) * wide / width
         figure.text(middle, 1.0 - 0.02 / height, heads[place], ha="center", va="top", fontsize=8.5)
-        if below:
-            figure.text(middle, (under - 0.02) / height, below[place], ha="center", va="top", fontsize=8)
     return figure
 
 

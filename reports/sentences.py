@@ -21,7 +21,7 @@ from reports.statistics.relative_excess import (
 )
 from reports.tables.table import in_scenes, listed, number
 
-CURVATURE, DISTANCE = "curvature/error", "distance/rms"
+CURVATURE, DISTANCE = "curvature/histogram", "distance/rms"
 
 
 def headline(run: Run) -> list[tuple[str, str]]:
@@ -79,10 +79,9 @@ def _certainty(run: Run, worn: pd.DataFrame) -> str:
     distance, curvature = (indistinct(run, worn, metric) for metric in (DISTANCE, CURVATURE))
     if distance and curvature:
         sentences.append(
-            "Equally valid simulations (another start, contact search or tolerance) lie "
-            f"{number(distance, 2)} mm and {number(curvature, 2)} 1/m of mean curvature from the reference, "
-            f"{in_scenes(set(error_of_twin(worn, DISTANCE).index))}: errors below that show no "
-            "difference."
+            f"The reference from another start lies {number(distance, 2)} mm and, by the distribution of "
+            f"curvature, {number(curvature, 2)} 1/m away, "
+            f"{in_scenes(set(error_of_twin(worn, DISTANCE).index))}: errors below that show no difference."
         )
     return " ".join(sentences)
 

@@ -11,7 +11,7 @@ from typing import Any
 
 from benchmarks.method import MethodEntry, Reporting, Simulated, Training
 from snug.kinds import KINDS
-from snug.named_recipes import ABLATIONS, PAPER, PAPERS, PBNS_SPRINGS
+from snug.named_recipes import ABLATIONS, PAPER, PAPER_ABLATIONS, PAPERS, PBNS_SPRINGS
 
 TRAININGS = {
     **{
@@ -20,7 +20,10 @@ TRAININGS = {
     },
     "pbns-paper": Training("pbns", PAPER),
     "pbns-springs": Training("pbns", PBNS_SPRINGS),
-    **{f"snug-{recipe.name}": Training("snug", recipe) for recipe in (*PAPERS, *ABLATIONS)},
+    **{
+        f"snug-{recipe.name}": Training("snug", recipe)
+        for recipe in (*PAPERS, *PAPER_ABLATIONS, *ABLATIONS)
+    },
 }
 
 
@@ -167,13 +170,15 @@ _LABELS = {
     "detached-past": "inertia about a detached past",
     "two-transitions": "inertia of two transitions",
     "springs": "springs instead of StVK",
+    **{recipe.name: f"paper's text, no {recipe.name[9:]}" for recipe in PAPER_ABLATIONS},
 }
 RECIPES = tuple(
     network(
         f"snug-{recipe.name}", f"SNUG, {_LABELS.get(recipe.name, recipe.name.replace('-', ' '))}",
-        f"ablation: SNUG, recipe {recipe.name}", role="ablation", base="snug", pairing_group="snug",
+        f"ablation: SNUG, recipe {recipe.name}", role="ablation", base=base, pairing_group="snug",
     )
-    for recipe in ABLATIONS
+    for base, recipes in (("snug", ABLATIONS), ("snug-paper", PAPER_ABLATIONS))
+    for recipe in recipes
 )  # fmt: skip
 
 

@@ -8,9 +8,12 @@ with A_i the mixed Voronoi area (Meyer, Desbrun, Schröder and Barr 2003): the V
 triangle is not obtuse, else half or a quarter of its area. H is a magnitude: it has no sign. At a
 boundary vertex the formula means nothing, so those are left out.
 
-The paper reports a "mean curvature error" without a definition. Ours, at each frame, is
+The paper reports a "mean curvature error" without a definition. Wrinkles are compared by the
+distribution of H over the area of a frame, wherever they lie:
+    integral | F(H) - F^ref(H) | dH              F the share of the area with less curvature,
+averaged over frames; the difference of the two means of H says to which side. The error of each vertex,
     sum_i A_i | H_i - H_i^ref | / sum_i A_i      over interior vertices, A_i of the reference,
-averaged over frames. The difference of the two means is given beside it: it is blind to places.
+punishes a wrinkle in another place twice: a simulation from another start has a large one too.
 
 Whether wrinkles stay the same while the body moves ("the same despite the significant change in body
 pose", the paper says of PBNS) is told by
@@ -46,7 +49,7 @@ def measure(roll_out: RollOut) -> dict[str, float]:
 
 
 def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
-    """Return error, histogram distance and difference of means against the reference [1/m].
+    """Return distance of distributions, difference of means and vertex-wise error against the reference.
 
     Empty where the mesh has no interior vertex.
     """
@@ -55,9 +58,9 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
     if not theirs.area.any():
         return {}
     return {
-        "curvature/error": float(curvature_error(ours, theirs).mean()),
         "curvature/histogram": float(histogram_distance(ours, theirs).mean()),
         "curvature/mean_difference": float((ours.means() - theirs.means()).mean()),
+        "curvature/error": float(curvature_error(ours, theirs).mean()),
     }
 
 
@@ -188,14 +191,14 @@ CURVATURE = Measurements(
     metrics_of(
         ("curvature/mean", "1/m", "Mean curvature",
          "magnitude of the mean curvature, mean over interior vertices by area and over frames"),
-        ("curvature/error", "1/m", "Mean-curvature error",
-         "|H - H_ref| of the same vertices and frames, mean by the reference's areas",
-         {"lower_is_better": True}),
-        ("curvature/histogram", "1/m", "Histogram",
+        ("curvature/histogram", "1/m", "Curvature, distribution",
          "Wasserstein-1 distance between the area-weighted distributions of H at the same frame",
          {"lower_is_better": True}),
         ("curvature/mean_difference", "1/m", "Difference of means",
          "area-weighted mean of H less that of the reference"),
+        ("curvature/error", "1/m", "Curvature, vertex-wise error",
+         "|H - H_ref| of the same vertices and frames, mean by the reference's areas",
+         {"lower_is_better": True}),
         ("curvature/change", "1", "Change of wrinkles",
          "share of the scatter of curvature that is change over time: mean |H - median of the vertex over "
          "frames| divided by mean |H - mean of all vertices and frames|, weighted by area; 0 where "

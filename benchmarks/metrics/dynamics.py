@@ -35,7 +35,8 @@ SHIFTING = 5e-3  # [m] rms static displacement below which there is nothing to b
 MAX_LAG = 12.0  # frames
 SHORTEST = 8  # frames of which a motion can be said
 NO_MOTION = 1e-6  # [m] rms of a dynamic part that is none
-HEM = (("amplitude", "Hem amplitude"), ("correlation", "Correlation"), ("gain", "Gain"), ("lag", "Lag"))
+TITLES = ("Hem correlation", "Hem amplitude", "Gain", "Lag")
+HEM = tuple(zip(("correlation", "amplitude", "gain", "lag"), TITLES))
 
 
 def dynamic_part(moving: Array, static: Array) -> Array:
@@ -143,7 +144,7 @@ class HemMotion:
         still = quiet if static is None else self.of(static[:last])[judged]
         part, reference = dynamic_part(moving, still), dynamic_part(simulated, quiet)
         gain, lag = response(moving, still, self.axes[judged])
-        values = (amplitude(part, reference), correlation(part, reference), gain, lag)
+        values = (correlation(part, reference), amplitude(part, reference), gain, lag)
         return {f"dynamics/{name}": v for (name, _), v in zip(HEM, values) if np.isfinite(v)}
 
 
@@ -205,11 +206,12 @@ DYNAMICS = Measurements(
     metrics_of(
         ("dynamics/quasi_static_difference", "mm", "From quasi-static",
          "root mean square distance to the method's own quasi-static solution"),
+        ("dynamics/correlation", "1", "Hem correlation",
+         "cosine between the dynamic parts of method and simulation: the hem's motion less the method's "
+         "own quasi-static solution"),
         ("dynamics/amplitude", "1", "Hem amplitude",
-         "root mean square of the hem's dynamic part (motion less the method's own quasi-static "
-         "solution), divided by the simulation's"),
-        ("dynamics/correlation", "1", "Correlation",
-         "cosine between the dynamic parts of method and simulation"),
+         "root mean square of the hem's dynamic part, divided by the simulation's; says nothing without the "
+         "correlation, an untrained network has one too"),
         ("dynamics/gain", "1", "Gain",
          "factor of the least-squares fit of the hem's turn (or shift) to that of its own quasi-static "
          "solution, dynamics/lag frames earlier"),

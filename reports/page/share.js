@@ -2,11 +2,11 @@
 
 const ESCAPED = { markdown: /[|\\]/g, latex: /[&%$#_{}]/g };
 
-// Heads, lines and the paper's printed lines of a table, as plain text.
+// Heads and lines of a table, as plain text.
 function tableCells(table) {
   const heads = table.columns.map((column) => (column.unit ? `${column.title} [${column.unit}]` : column.title));
   const text = (cell) => (Array.isArray(cell) ? cell[0] : cell).trim();
-  return [heads, ...[...table.rows, ...table.printed].map((row) => row.map(text))];
+  return [heads, ...table.rows.map((row) => row.map(text))];
 }
 
 const FORMATS = {

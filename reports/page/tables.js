@@ -56,13 +56,13 @@ function showTable(table, root, definition, note) {
       if (arrow) cell.firstChild.append(element('span', { class: 'arrow', 'aria-hidden': 'true' }, arrow));
     });
     const rows = column < 0 ? table.rows : sorted(table.rows, column, direction);
-    body.replaceChildren(...rows.map((row) => lineOf(row, table)), ...table.printed.map((row) => lineOf(row, table, 'printed')));
+    body.replaceChildren(...rows.map((row) => lineOf(row, table)));
   };
   head.replaceChildren(element('tr', {}, ...titles));
   fill();
 }
 
-function lineOf(row, table, kind = '') {
+function lineOf(row, table) {
   const cells = row.map((cell, k) => {
     const [text, , spread, mark, link] = Array.isArray(cell) ? cell : [cell, null, '', ''];
     const shown = text + (mark || '');
@@ -70,5 +70,5 @@ function lineOf(row, table, kind = '') {
     if (spread) node.append(element('small', {}, spread));
     return node;
   });
-  return element('tr', { class: kind }, ...cells);
+  return element('tr', {}, ...cells);
 }

@@ -78,9 +78,8 @@ def tables_of(report: Report) -> list[dict[str, Any]]:
 
 def table_data(run: Run, table: Table) -> dict[str, Any]:
     """Return a table as the page's script shows it; the run declares its metrics and methods."""
-    printed = [_printed(table, reference) for reference in table.references]
     texts = [
-        column_texts(run, column, [row[place] for row in table.rows], [row[place] for row in printed])
+        column_texts(run, column, [row[place] for row in table.rows])
         for place, column in enumerate(table.columns)
     ]
     lines = [list(line) for line in zip(*texts)]
@@ -88,17 +87,7 @@ def table_data(run: Run, table: Table) -> dict[str, Any]:
     return {
         "name": table.name, "caption": table.caption or table.name, "note": remarks_below(table, lines),
         "columns": [_column(run, column) for column in table.columns], "rows": rows,
-        "printed": [[text["text"] for text in line] for line in lines[len(rows) :]],
     }  # fmt: skip
-
-
-def _printed(table: Table, reference: tuple[str, dict[str, str]]) -> list[str]:
-    """Return a row of the paper's values: its label stands in the last column of texts."""
-    label, values = reference
-    texts = [column.name for column in table.columns if column.text]
-    return [
-        label if column.name == texts[-1] else values.get(column.name, "") for column in table.columns
-    ]
 
 
 def _column(run: Run, column: Column) -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""Outcomes of a run: checks with a known answer, stress tests, how cells ended, overstretched roll-outs."""
+"""Outcomes of a run: checks with a known answer, stress tests, how cells ended."""
 
 from __future__ import annotations
 
@@ -16,7 +16,6 @@ from reports.finished_run import Run, read_run
 from reports.statistics.pareto import NETWORK
 
 BAD = ("failed", "diverged", "timeout", "out-of-memory", "stalled")  # statuses, the worst first
-STRAINS = ("motion/strain", "energy/strain")  # of the worst frame, and the mean
 
 
 def checks(run: Run) -> pd.DataFrame:
@@ -62,27 +61,6 @@ def counted(run: Run) -> dict[str, Counter[str]]:
         "stress tests": stress_tests(run),
     }
     return {kind: Counter(rows["status"]) for kind, rows in groups.items() if len(rows)}
-
-
-def overstretched(run: Run) -> list[tuple[str, str, float, float]]:
-    """List trained networks with more strain than the reference, the worst first.
-
-    Each with method, scene, strain [J] of its worst frame, else the mean, and the ratio to the
-    reference's.
-    """
-    networks = [name for name in run.with_role("network") if not run.methods[name].base]
-    strains: dict[tuple[str, str], tuple[float, float]] = {}
-    for metric in STRAINS:
-        rows = run.frame[
-            (run.frame["metric"] == metric) & run.frame["usable"] & (run.frame["garment"] != "")
-        ]
-        values = rows.groupby(["scene", "method"])["value"].mean()
-        for (scene, method), value in values.items():
-            base = values.get((scene, run.reference))
-            if method in networks and base and (method, scene) not in strains:
-                strains[method, scene] = float(value), float(value / base)
-    worst = [(*key, *line) for key, line in strains.items() if line[-1] > 1.0]
-    return sorted(worst, key=lambda line: -line[-1])
 
 
 LEARNED = ("network", "ablation")

@@ -15,7 +15,7 @@ WHOLE = "cost/whole"  # TIME is a method's own work; this is all from pose to wo
 # Of the method's own step first: no chaos blurs them. Then those of the roll-out against the
 # simulation's.
 ERRORS = (
-    "gap/energy", "step/curvature", "step/distance", "curvature/error", "distance/rms", "curvature/histogram",
+    "gap/energy", "step/curvature", "step/distance", "curvature/histogram", "distance/rms", "curvature/error",
 )  # fmt: skip
 PLANES = {
     "gap/energy": "gap/refrozen"
@@ -172,7 +172,7 @@ def error_points(run: Run, rows: pd.DataFrame, metric: str) -> list[Point]:
 
 
 NETWORK = "snug"  # the method whose accuracy a solver has to reach to be its rival
-ACCURACIES = ("gap/energy", "curvature/error")
+ACCURACIES = ("gap/energy", "curvature/histogram")
 
 
 def rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:

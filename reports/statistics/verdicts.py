@@ -23,10 +23,11 @@ import pandas as pd
 from benchmarks.metric import Metric
 from benchmarks.results.protocol import LEAST_MOTIONS, LEVEL
 from reports.finished_run import Run
-from reports.statistics.effects import EXCESS, RANGE, Effect, cost_effect, effect
+from reports.statistics.effects import DIFFERENCE, EXCESS, RANGE, Effect, cost_effect, effect
 from reports.statistics.means_and_spreads import Mean, pair
 from reports.statistics.relative_excess import compared_excess, relative_metric
 
+SIGNED = {"dynamics/correlation": DIFFERENCE}  # on this scale though a run may have positive values alone
 TIED, OPEN, LESS, MORE = "tie", "inconclusive", "less", "more"  # how the first stands to the second
 
 
@@ -68,7 +69,7 @@ def effect_of(metric: Metric, one: Mean, other: Mean) -> Effect:
     """Compute the effect between two means of a metric, on the metric's scale."""
     if metric.of != "answer":
         return cost_effect(one, other, exact=metric.of == "method")
-    return effect(one, other, EXCESS if metric.arbitrary_zero else "")
+    return effect(one, other, EXCESS if metric.arbitrary_zero else SIGNED.get(metric.name, ""))
 
 
 def standing(far: Effect, p: float | None, factor: float = 1.0) -> str:

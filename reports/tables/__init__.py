@@ -14,19 +14,19 @@ from reports.tables.findings import (
     excess_by_time_step,
     extremes,
     findings,
-    paper_table_1,
     relative_excess,
     unfinished,
     validation,
 )
 from reports.tables.page_one import error_rivals, overview, reference_uncertainty
+from reports.tables.paper_tables import paper_tables
 from reports.tables.pivots import ablation_effects, ablations, metric_tables, shapes
 from reports.tables.table import Table
 
 TABLES: tuple[Callable[[Run], list[Table]], ...] = (
     metric_tables,
     overview,
-    paper_table_1,
+    paper_tables,
     relative_excess,
     excess_by_time_step,
     errors_in_spreads,

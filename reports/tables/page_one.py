@@ -11,6 +11,7 @@ from reports.statistics.effects import Effect
 from reports.statistics.means_and_spreads import mean_of, value_of
 from reports.statistics.outcomes import EXTERNAL, leads
 from reports.statistics.pareto import (
+    ACCURACIES,
     NETWORK,
     SMALLER_STEPS,
     beaten_by,
@@ -28,7 +29,7 @@ from reports.statistics.verdicts import compare_methods
 from reports.tables.table import Cell, Column, Table, in_scenes, metric_column, table
 
 ROWS = 8
-ANSWERS = ("penetration/surface", "dynamics/amplitude", "dynamics/correlation")
+ANSWERS = ("penetration/surface", "dynamics/correlation", "dynamics/amplitude")
 GAP = "gap/energy"
 
 
@@ -109,9 +110,9 @@ def _times_faster(run: Run, timed: pd.DataFrame, method: str) -> Effect | None:
     return compare_methods(run, timed, metric, run.reference, method).effect
 
 
-RIVAL_ERRORS = ("gap/energy", "curvature/error")
-UNCERTAIN = ("curvature/error", "distance/rms")
-OF_STEPS = ("energy/strain", "dynamics/amplitude")  # what the time step changes
+UNCERTAIN = ("curvature/histogram", "curvature/error", "distance/rms")
+# What the time step changes.
+OF_STEPS = ("energy/strain", "dynamics/correlation", "dynamics/amplitude")
 
 
 def error_rivals(run: Run) -> list[Table]:
@@ -119,7 +120,7 @@ def error_rivals(run: Run) -> list[Table]:
     frame = run.cells("speed", "garments")
     scenes = compared_scenes(run, frame)
     lines: list[tuple[Cell, ...]] = []
-    for metric in RIVAL_ERRORS:
+    for metric in ACCURACIES:
         points = points_of(run, frame, scenes, metric) if metric in run.metrics else []
         network = next((p for p in points if p.method == NETWORK), None)
         if network is None:

@@ -135,8 +135,7 @@ GARMENT, SCENE, SUITE = (
 class Table:
     """Columns and rows; each row has one cell per column.
 
-    grouped_by: columns that become headings in the PDF. references: label and texts by column of rows
-    that the paper printed; they are in no CSV.
+    grouped_by: columns that become headings in the PDF.
     """
 
     name: str
@@ -144,7 +143,6 @@ class Table:
     rows: tuple[tuple[Cell, ...], ...]
     caption: str = ""
     grouped_by: tuple[str, ...] = ()
-    references: tuple[tuple[str, dict[str, str]], ...] = ()
     note: str = ""
 
     def write_csv(self, folder: Path) -> Path:
@@ -236,13 +234,10 @@ def remarks_below(table: Table, lines: Sequence[Sequence[CellText]]) -> str:
     return " ".join([*remarks, *(REMARKS[mark] for mark in sorted(marks))])
 
 
-def column_texts(
-    run: Run, column: Column, cells: Sequence[Cell], printed: Sequence[str]
-) -> list[CellText]:
-    """Return text, spread or interval, and marks of a column's cells; `printed`: the paper's rows below."""
-    texts = [*(_text(run, column, cell) for cell in cells), *printed]
+def column_texts(run: Run, column: Column, cells: Sequence[Cell]) -> list[CellText]:
+    """Return text, spread or interval, and marks of a column's cells."""
     lines = []
-    for text, cell in zip(texts, [*cells, *[None] * len(printed)]):
+    for cell in cells:
         spread, mark = "", ""
         if isinstance(cell, Mean):
             mark = ("" if cell.complete else "*") + ("†" if cell.stalled else "")
@@ -252,7 +247,7 @@ def column_texts(
             mark = ("" if cell.complete else "*") + _COVERED.get(cell.covers, "")
             ends = cell.interval or ()
             spread = " to ".join("∞" if end == math.inf else number(end, column.digits) for end in ends)
-        lines.append({"text": text, "spread": spread, "mark": mark})
+        lines.append({"text": _text(run, column, cell), "spread": spread, "mark": mark})
     return lines
 
 

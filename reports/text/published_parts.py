@@ -47,6 +47,7 @@ from reports.statistics.relative_excess import excess_of, with_relative_excess
 from reports.statistics.verdicts import compare_methods, measure_of
 from reports.tables import TABLES
 from reports.tables.page_one import overview
+from reports.tables.paper_tables import paper_tables
 from reports.tables.pivots import metric_tables
 from reports.tables.table import DASH, Table, number
 from reports.text.text_table import markdown_table, remarks_on, text_rows
@@ -182,25 +183,24 @@ def front_sentences(run: Run) -> str:
     return "\n".join([
         f"**In a typical unseen motion SNUG removes {number(100.0 - snug.typical, 2)} % of the energy that "
         f"skinning has in excess of a converged simulation ({number(100.0 - snug.pooled, 2)} % pooled over "
-        f"all motions), more than {times} times faster than that simulation; its garments have "
-        f"{secondary_motion(swing.value)} secondary motion.**",
+        f"all motions), more than {times} times faster than that simulation; the dynamics of its hem "
+        f"{likeness(alike.value)} the simulation's.**",
         "",
         f"- Good at: energy for its time. PBNS leaves {number(pbns.typical, 2)} % of that excess, the "
         f"supervised network {number(supervised.typical, 2)} %; solvers as accurate take at least "
         f"{number(solver.time / network.time, 1)} times as long.",
-        f"- Bad at: dynamics and unfamiliar motion. Its hem moves {number(100.0 * swing.value, 1)} % as far "
-        f"as the simulation's (correlation {number(alike.value, 2)}); the worst motion, "
+        f"- Bad at: dynamics and unfamiliar motion. Its hem's dynamics have a correlation of "
+        f"{number(alike.value, 2)} with the simulation's, and {number(100.0 * swing.value, 1)} % of their "
+        f"amplitude; the worst motion, "
         f"{worst.partition('/')[2]}, keeps {number(most, 2)} %.",
     ])  # fmt: skip
 
 
-def secondary_motion(amplitude: float) -> str:
-    """Return how much of the simulation's secondary motion there is, in words."""
-    if amplitude < 0.2:
-        return "almost no"
-    if amplitude < 0.8:
-        return "less"
-    return "about as much" if amplitude < 1.25 else "more"
+def likeness(correlation: float) -> str:
+    """Return in words how dynamics follow others with which they have that correlation."""
+    if correlation < 0.3:
+        return "hardly follow"
+    return "partly follow" if correlation < 0.8 else "follow"
 
 
 def run_rows(folders: Sequence[Path]) -> Rows:
@@ -256,6 +256,7 @@ def _made(folder: Path, name: str) -> Table:
     run = read_published(folder)
     makers = {make.__name__: make for make in TABLES}
     tables = makers[name](run) if name in makers else metric_tables(run, name)
+    tables = tables or [made for made in paper_tables(run) if made.name == name]
     if not tables:
         raise KeyError(f"table {name} of {folder.name}")
     return tables[0]

@@ -30,7 +30,7 @@ def text_rows(run: Run, table: Table, columns: Sequence[str] = ()) -> list[list[
     texts: list[list[str]] = []
     for place in (places[name] for name in columns or places):
         column, cells = table.columns[place], [row[place] for row in table.rows]
-        printed = column_texts(run, column, cells, [])
+        printed = column_texts(run, column, cells)
         heading = f"{column.title} [{column.unit_above}]" if column.unit_above else column.title
         texts.append([heading, *(cell["text"].strip() + _marks(cell) for cell in printed)])
         if any(isinstance(cell, Effect) and cell.interval for cell in cells):
@@ -78,7 +78,7 @@ def markdown_table(rows: Sequence[Sequence[str]]) -> str:
 
 
 COLUMNS = (
-    "method", "relative_excess", "dynamics/amplitude", "penetration/surface", "cost/whole", "cost/frame",
+    "method", "relative_excess", "dynamics/correlation", "penetration/surface", "cost/whole", "cost/frame",
     "gap/energy", "faster",
 )  # fmt: skip
 MOST_COLUMNS = 5  # of COLUMNS, without the intervals of effects

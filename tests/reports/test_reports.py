@@ -76,7 +76,7 @@ def test_every_file_of_the_report_is_there(made):
     pictures = {path.name for path in made.figures.iterdir()}
     for stem in ("energy_series_tshirt-walk", "error_against_time"):
         assert {f"{stem}.svg", f"{stem}.png"} <= pictures
-    assert {"frames_tshirt-walk.png", "failures.png", *KEPT} <= pictures and pictures.isdisjoint(OLD)
+    assert {"frames_tshirt-walk.png", *KEPT} <= pictures and pictures.isdisjoint(OLD)
     assert made.report_path.read_bytes().startswith(b"%PDF")
 
 

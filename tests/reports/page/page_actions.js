@@ -32,7 +32,7 @@
     return [...context.getImageData(0, 0, 60, 60).data];
   };
   const distinct = () => new Set(picture().filter((x, k) => k % 4 === 0)).size;
-  const column = (k) => [...document.querySelectorAll('#scroll tbody tr:not(.printed)')].map((row) => row.children[k].textContent);
+  const column = (k) => [...document.querySelectorAll('#scroll tbody tr')].map((row) => row.children[k].textContent);
 
   async function act() {
     await until(() => panes().length && byId('clock').textContent && distinct() > 8);

@@ -46,7 +46,7 @@ def all_rows() -> list[Row]:
         for method, (time, gap, curvature) in WORN.items():
             rows += [row(scene, method, "cost/frame", time, "ms"), row(scene, method, "gap/energy", gap)]
             if curvature is not None:
-                rows.append(row(scene, method, "curvature/error", curvature, "1/m"))
+                rows.append(row(scene, method, "curvature/histogram", curvature, "1/m"))
     for method in ("simulation", "newton-1", "newton-4"):
         time, gap, _ = WORN[method]
         rows += [row("sheet", method, "cost/frame", time, "ms"), row("sheet", method, "gap/energy", gap)]
