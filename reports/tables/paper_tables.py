@@ -78,7 +78,7 @@ def _energies(run: Run, name: str, pbns: str, snug: str) -> list[Table]:
         Column("ratio_paper", "SNUG / PBNS, in the paper", digits=2),
     )  # fmt: skip
     caption = (
-        f"Table 1 beside the paper's: {run.label(pbns)} and {run.label(snug)}, means over the frames of the "
+        f"The paper's table 1 beside {run.label(pbns)} and {run.label(snug)}, means over the frames of the "
         "motions. The paper's are over 598 frames of its four test sequences; it does not state where its "
         "gravity is zero."
     )
@@ -116,8 +116,8 @@ def _curvature(run: Run, name: str, base: str) -> list[Table]:
         Column("ratio_paper", "Over full, in the paper", digits=2),
     )  # fmt: skip
     caption = (
-        f"Table 2 beside the paper's: curvature of {run.label(base)} against the reference, means over the "
-        "frames of the motions. Simulations from another start or with smaller time steps have the errors "
-        "of an equally valid answer. The paper states neither operator nor unit of its error."
+        f"The paper's table 2 beside curvature of {run.label(base)} against the reference, means over the "
+        "frames of the motions. Below: the reference from another start or with smaller time steps, a floor "
+        "of the errors. The paper states neither operator nor unit of its error."
     )
     return table(name, columns, lines, caption, grouped_by=("motions",))
