@@ -30,7 +30,7 @@ from tests.reports.report_folder import (
     write_roll_outs,
 )
 
-OLD = ("energy_series_flag.svg", "failures_tunic.svg")
+OLD = ("energy_series_flag.svg", "frames_tunic.svg")
 KEPT = ("mine.png", "map.txt", "gap-relative_against_cost-frame.svg")
 
 
