@@ -44,7 +44,16 @@ PAPER_CONTACT = replace(
 PAPER_NEAREST_VERTEX = replace(
     PAPER, name="paper-nearest-vertex", contact_samples="nearest_vertices", contact_margin=0.001
 )
-PAPERS = (PAPER, PAPER_CONTACT, PAPER_NEAREST_VERTEX)
+
+
+def _without(term: str, recipe: Recipe = DEFAULT) -> Recipe:
+    name = f"{recipe.name}-no-{term}".removeprefix("default-")
+    return replace(recipe, name=name, terms=tuple(name for name in TERMS if name != term))
+
+
+# The columns of the paper's table 2.
+PAPER_ABLATIONS = tuple(_without(term, PAPER) for term in TERMS if term != "collision")
+PAPERS = (PAPER, PAPER_CONTACT, PAPER_NEAREST_VERTEX, *PAPER_ABLATIONS)
 # Vertices of a simulation depend on more than two frames before: longer windows follow them better (7 mm
 # instead of 13 on the training motions at 500 vertices), and there is no energy that a window could
 # exploit. A rate of 1e-3: as near to the simulation on three held-out motions as with 2e-3, with less
@@ -98,13 +107,6 @@ NCS = replace(
 PBNS_SPRINGS = replace(PBNS, name="pbns-springs", material="pbns", contact_samples="vertices")
 
 
-def _without(term: str, recipe: Recipe = DEFAULT) -> Recipe:
-    name = f"{recipe.name}-no-{term}".removeprefix("default-")
-    return replace(recipe, name=name, terms=tuple(name for name in TERMS if name != term))
-
-
-# The columns of the paper's table 2.
-PAPER_ABLATIONS = tuple(_without(term, PAPER) for term in TERMS if term != "collision")
 # Longer windows get smaller batches, so that a step sees 48 frames in each. Bodies of other shapes: with
 # all augmented clips on them the excess over the simulation on the mean body was 0.052 J, with half
 # 0.033, without 0.027 (docs/notebook/simulator.md).
@@ -120,9 +122,7 @@ ABLATIONS = (
     replace(DEFAULT, name="springs", material="springs"),
     replace(DEFAULT, name="printed-bending", bending="none"),
 )
-RECIPES = {
-    recipe.name: recipe for recipe in (DEFAULT, *PAPERS, *PAPER_ABLATIONS, PBNS, PBNS_SPRINGS, *ABLATIONS)
-}
+RECIPES = {recipe.name: recipe for recipe in (DEFAULT, *PAPERS, PBNS, PBNS_SPRINGS, *ABLATIONS)}
 
 
 def find_recipe(name: str) -> Recipe:

@@ -20,10 +20,7 @@ TRAININGS = {
     },
     "pbns-paper": Training("pbns", PAPER),
     "pbns-springs": Training("pbns", PBNS_SPRINGS),
-    **{
-        f"snug-{recipe.name}": Training("snug", recipe)
-        for recipe in (*PAPERS, *PAPER_ABLATIONS, *ABLATIONS)
-    },
+    **{f"snug-{recipe.name}": Training("snug", recipe) for recipe in (*PAPERS, *ABLATIONS)},
 }
 
 
