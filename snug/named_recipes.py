@@ -105,8 +105,6 @@ NCS = replace(
     batch=32,
 )
 PBNS_SPRINGS = replace(PBNS, name="pbns-springs", material="pbns", contact_samples="vertices")
-
-
 # Longer windows get smaller batches, so that a step sees 48 frames in each. Bodies of other shapes: with
 # all augmented clips on them the excess over the simulation on the mean body was 0.052 J, with half
 # 0.033, without 0.027 (docs/notebook/simulator.md).

@@ -111,8 +111,7 @@ def _times_faster(run: Run, timed: pd.DataFrame, method: str) -> Effect | None:
 
 
 UNCERTAIN = ("curvature/histogram", "curvature/error", "distance/rms")
-# What the time step changes.
-OF_STEPS = ("energy/strain", "dynamics/correlation", "dynamics/amplitude")
+OF_STEPS = ("energy/strain", "dynamics/correlation", "dynamics/amplitude")  # which it changes
 
 
 def error_rivals(run: Run) -> list[Table]:
