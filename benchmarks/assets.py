@@ -23,10 +23,6 @@ LIBRARY = "library"  # in place of a path: the embedded motions
 FEWEST_FRAMES = 3  # of a motion: inertia needs two before the one that is evaluated
 
 
-class InputError(ValueError):
-    """A user's file that cannot take part in a run; the message names file and remedy."""
-
-
 @dataclass(frozen=True, eq=False)
 class Read:
     """A user's file as read: a body of SMPL's family, or a garment on the body of the run.
@@ -69,8 +65,8 @@ def read_inputs(
     """Read a user's files: body, a mesh made for it, motions but for "library".
 
     Raises:
-        ValueError: one line with file and remedy: BodyError, GarmentError, MotionError, or InputError for
-            a motion that is too short or has the name of another.
+        ValueError: one line with file and remedy: BodyError, GarmentError, or MotionError, also for a
+            motion that is too short or has the name of another.
 
     >>> read_inputs().garment is None
     True
@@ -95,15 +91,16 @@ def _read_motions(files: Sequence[str], options: MotionFileOptions | None) -> di
     from snug.motion.files import load_motions  # its readers are slow to load
     from snug.motion.library import CLIPS
     from snug.motion.library import LIBRARY as MADE
+    from snug.motion.motion import MotionError
 
     for path in files:
         for motion in load_motions(path, options=options):
             # A file of a recorded clip's name takes the clip's place.
             if motion.name in motions or (motion.name in MADE and motion.name not in CLIPS):
-                raise InputError(f"--motions {path}: the name '{motion.name}' is taken; rename the file")
+                raise MotionError(f"--motions {path}: the name '{motion.name}' is taken; rename the file")
             if motion.frames < FEWEST_FRAMES:
                 few = f"{motion.frames} frames; at least {FEWEST_FRAMES} are needed"
-                raise InputError(f"--motions {path}: {few}")
+                raise MotionError(f"--motions {path}: {few}")
             motions[motion.name] = motion
     return motions
 

@@ -57,6 +57,8 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, repo
     """Run the plan, or print what would be run; return the exit status. report: whether to make one."""
     for motion in plan.inputs.motions.values():
         print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
+    if absent := plan.study.motion_files.absent(plan.inputs.motions):
+        print(absent, file=sys.stderr)
     for name, text in plan.cut_motions.items():
         print(f"motion {name}: {text} are measured; --set sizes.frames=N measures more", file=sys.stderr)
     from benchmarks.runner.execute_plan import check_roll_outs, describe, execute, held

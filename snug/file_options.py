@@ -7,6 +7,8 @@ from __future__ import annotations
 
 import math
 import re
+import tomllib
+from collections.abc import Collection
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -17,9 +19,10 @@ GARMENT_WORDS = """behind the path of a garment, as in shirt.obj,units=cm,up=z: 
 up (y, z), shift='0 0.1 0' [m] where the body stood elsewhere, rest=uv where the UV chart is the pattern,
 uv_scale (metres per unit of the chart), material (.toml of young_modulus [Pa], poisson_ratio,
 thickness [m], density [kg/m^3], bending_stiffness [J])"""
-MOTION_WORDS = (
-    """behind the path of motions, as in clips/,up=z: up (y, z), fps (of files that state none)"""
-)
+# name -> role -> numbers of clips, with their sources
+SPLITS = tomllib.loads((Path(__file__).parent / "motion/splits.toml").read_text(encoding="utf-8"))
+MOTION_WORDS = f"""behind the path of motions, as in clips/,up=z: up (y, z), fps (of files that state none),
+split ({", ".join(SPLITS)}: of a folder of CMU's or AMASS's files the clips of that paper alone)"""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,6 +78,7 @@ class MotionFileOptions:
     Attributes:
         up: vertical axis of the file, "y" or "z"; empty: found from the motion.
         fps: frames per second of a file that states none [1/s].
+        split: name of one of SPLITS; its clips alone are read, from the folder and all below it.
 
     Raises:
         ValueError: a word without sense.
@@ -82,11 +86,24 @@ class MotionFileOptions:
 
     up: str = ""
     fps: float | None = None
+    split: str = ""
 
     def __post_init__(self) -> None:
         _demand_one_of(("", *AXES), "up", self.up)
+        _demand_one_of(("", *SPLITS), "split", self.split)
         if self.fps is not None and not _is_number(self.fps):
             raise ValueError(f"fps={self.fps}: give a number of frames per second")
+
+    def clips(self, *roles: str) -> tuple[str, ...]:
+        """Return the clips of the split in the roles "train" and "test"; none without a split."""
+        return tuple(clip for role in roles for clip in SPLITS.get(self.split, {}).get(role, ()))
+
+    def absent(self, motions: Collection[str]) -> str:
+        """Return a line on the clips of the split that are not among these motions; empty: all are there."""
+        clips = self.clips("test", "train")
+        absent = [clip for clip in clips if clip not in motions]
+        what = f"split {self.split}: {len(absent)} of {len(clips)} clips are absent"
+        return f"{what}: {', '.join(absent)}" if absent else ""
 
 
 def _demand_one_of(known: tuple[str, ...], name: str, value: object) -> None:

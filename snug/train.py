@@ -60,19 +60,11 @@ def parse_options(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         help=f"{garments}, or a mesh made for the body (default: %(default)s)")  # fmt: skip
     add("--vertices", type=int, default=1000, help="of a garment (default: %(default)s)")
     add("--body", metavar="FILE", help="your own body of SMPL's family, .npz or .pkl")
-    add(
-        "--motions",
-        metavar="PATH",
-        help="a motion file or a folder of them (default: the embedded library)",
-    )
+    add("--motions", metavar="PATH",
+        help="a motion file or a folder of them (default: the embedded library)")  # fmt: skip
     add("--dataset", metavar="FILE", help="a file of simulated motions")
-    add(
-        "--hold-out",
-        metavar="NAME",
-        action="append",
-        default=[],
-        help="leave a motion out; may be repeated",
-    )
+    add("--hold-out", metavar="NAME", action="append", default=[],
+        help="leave a motion out; may be repeated")  # fmt: skip
     add("--validation", metavar="NAME", action="append", default=[],
         help="roll this motion out now and then: one held out of training, or of the library a validation "
         "motion or one without a role; may be repeated. The weights that do best are kept")  # fmt: skip
@@ -120,7 +112,8 @@ def choose_motions(
 ) -> tuple[list[Motion], list[Motion]]:
     """Return the motions to train on and those to validate with. Raises ValueError for an unknown name.
 
-    The simulated motions of a data set take the place of the library's.
+    The simulated motions of a data set take the place of the library's. Test clips of a published split
+    are left out.
     """
     from snug.motion.files import load_motions
     from snug.motion.library import CONTROL, DYNAMIC_VALIDATION, TRAIN, VALIDATION, make_motion
@@ -128,7 +121,10 @@ def choose_motions(
     motions = list(simulated) or [make_motion(name) for name in TRAIN]
     if options.motions:
         path, reading = parse_motion_files(options.motions)
-        motions = load_motions(path, options=reading)
+        read = load_motions(path, options=reading)
+        motions = [motion for motion in read if motion.name not in reading.clips("test")]
+        if absent := reading.absent([motion.name for motion in read]):
+            print(absent, file=sys.stderr)
     names = [motion.name for motion in motions]
     # Of the library; they never train.
     others = [name for name in (*VALIDATION, *DYNAMIC_VALIDATION, *CONTROL) if name not in names]

@@ -132,7 +132,7 @@ def expanded(patterns: Sequence[str], motions: Motions) -> list[str]:
     """Return the patterns of a part with garment and motions of a run in their places."""
     expansions = []
     for pattern in patterns:
-        pattern = pattern.replace("{garment}", motions.first_garment)
+        pattern = pattern.replace("{garment}", motions.worn[0].garment)
         if not (place := PLACES.search(pattern)):
             expansions.append(pattern)
             continue
@@ -198,7 +198,7 @@ def _check_words(read: ReadStudy) -> None:
 
 def _check_user_scenes(scenes: Sequence[Scene], motions: Motions) -> None:
     """Raise StudyError for a start or a motion that a user's scene names and nobody knows."""
-    starts = (*further_scenes(motions.first_garment), *scenes)
+    starts = (*further_scenes(motions.worn[0].garment), *scenes)
     settling = [scene.name for scene in starts if scene.simulated and not scene.start_of]
     for scene in (scene for scene in scenes if scene.declared_in):
         for field, names in (("start_of", settling), ("motion", [*motions.files, *LIBRARY])):

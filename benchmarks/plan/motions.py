@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from benchmarks.plan.study import Study, StudyError, nearest
 from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, of_garment
@@ -58,11 +58,6 @@ class Motions:
                 return "training" if role == "train" else role
         return ""
 
-    @property
-    def first_garment(self) -> str:
-        """The name of the first one."""
-        return self.worn[0].garment
-
     def by_role(self, garment: str) -> dict[str, tuple[str, ...]]:
         """Return role -> names of a garment's motions."""
         return self.roles(dynamic=of_garment(garment, self.worn).dynamic)
@@ -81,11 +76,17 @@ def split_motions(study: Study, files: Collection[str] = ()) -> Motions:
 
     Validation and test motions of the library never train, and its test motions never validate: where a
     part of a recorded clip is measured, no other part of that clip trains. Where nothing is left to train
-    on, the library trains.
+    on, the library trains. Test clips of a published split test, unless the study names others, and never
+    train.
 
     Raises:
         StudyError: a name that no motion has, or a split without motions.
     """
+    published = study.motion_files.clips("test")
+    if published and not study.test_motions:
+        study = replace(study, test_motions=tuple(name for name in published if name in files))
+        if not study.test_motions:
+            raise StudyError(f"motion_files.split: no test clip can be read: {', '.join(published)}")
     library = "library" in study.motions or not files
     of_library = (*VALIDATION, *TEST) if library else ()
     learned = dict.fromkeys((*sorted(files), *(TRAIN if library else ())))
@@ -104,7 +105,7 @@ def split_motions(study: Study, files: Collection[str] = ()) -> Motions:
         test = test or TEST
         validation = validation or tuple(name for name in VALIDATION if clip_of(name) not in tested)
     test = test or tuple(name for name in learned if name not in validation)[:1]
-    held_out = {clip_of(name) for name in (*test, *validation, *of_library)}
+    held_out = {clip_of(name) for name in (*test, *validation, *of_library, *published)}
     train = tuple(name for name in learned if clip_of(name) not in held_out)
     train = train or tuple(name for name in TRAIN if name not in held_out)
     split, sizes = study.split, study.sizes

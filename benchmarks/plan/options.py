@@ -149,7 +149,7 @@ def list_names(study: Study) -> str:
     """
     read = read_files(study)
     motions, parts = read.motions, study.parts
-    clip = f"{motions.first_garment}/{motions.measured[0]}@clip"
+    clip = f"{motions.worn[0].garment}/{motions.measured[0]}@clip"
     scenes = {
         scene.name: scene.description + (f" ({motions.role_of(scene.motion)})" if scene.dressed else "")
         for scene in read.scenes.values()

@@ -86,7 +86,7 @@ class Study:
         metrics: files of your own metrics, measured besides all others.
         seeds: seeds of training.
         motions: motion files (.npz, .bvh, .amc with .asf), folders, or the word library (default).
-        motion_files: what motion files do not state: up, fps.
+        motion_files: what motion files do not state: up, fps; split: snug or hood, that paper's clips alone.
         test_motions: names of the motions that test; by default those of the library.
         validation_motions: names of the motions that validate; neither these nor those that test train.
         split: which motions are measured: test, or validation, to choose recipes by.

@@ -348,7 +348,7 @@ class Schedule:
     def _settled_in(self, scene: Scene) -> Scene:
         """Return the scene whose settled garment another one starts from."""
         planned = next((s for s in self.plan.scenes if s.name == scene.start_of), None)
-        return planned or find_scene(scene.start_of, self.plan.motions.first_garment).at(self.preset)
+        return planned or find_scene(scene.start_of, self.plan.motions.worn[0].garment).at(self.preset)
 
 
 def _label(what: str, entry: MethodEntry) -> str:

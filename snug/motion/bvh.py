@@ -20,9 +20,7 @@ from snug.motion.motion import Motion, MotionError
 from snug.motion.recording import finite_numbers, frame_rate, parse_lines
 from snug.motion.retarget import FEET, LIMBS, match_joints, retarget, way_up
 
-CHANNELS = {
-    f"{axis}{kind}".lower(): f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ"
-}
+CHANNELS = {f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ"}
 
 
 @dataclass
@@ -41,7 +39,7 @@ def read_bvh(path: Path, options: MotionFileOptions) -> Motion:
 
     Raises MotionError.
     """
-    joints, frames, stated = read_clip(path)
+    joints, frames, stated = parse_lines(path, _parse)
     fps = frame_rate(len(frames), stated, options.fps)
     parents = [joint.parent for joint in joints]
     matches = match_joints([joint.name for joint in joints], parents)
@@ -96,10 +94,8 @@ def _standing(at: Mapping[str, np.ndarray]) -> tuple[np.ndarray, float]:
     Up is the axis nearest to the direction from ankles to head; left leads from hip to hip. Raises
     MotionError.
     """
-    leg = sum(
-        float(np.linalg.norm(at[near] - at[far]))
-        for near, far in (("left_hip", "left_knee"), ("left_knee", "left_ankle"))
-    )
+    hip, knee, ankle = (at[f"left_{joint}"] for joint in ("hip", "knee", "ankle"))
+    leg = float(np.linalg.norm(hip - knee) + np.linalg.norm(knee - ankle))
     way = at["head"] - 0.5 * (at["left_ankle"] + at["right_ankle"])
     up = np.zeros(3)
     up[np.abs(way).argmax()] = np.sign(way[np.abs(way).argmax()])
@@ -112,16 +108,8 @@ def _standing(at: Mapping[str, np.ndarray]) -> tuple[np.ndarray, float]:
     return np.stack((left, up, np.cross(left, up)), axis=1), leg
 
 
-def read_clip(path: Path) -> tuple[list[Joint], np.ndarray, float | None]:
-    """Parse a file: joints, parents first; numbers (T, C) of the frames; the rate [1/s] that it states.
-
-    Raises:
-        MotionError: names the line of what is damaged or too large.
-    """
-    return parse_lines(path, _parse)
-
-
 def _parse(lines: Iterator[list[str]]) -> tuple[list[Joint], np.ndarray, float | None]:
+    """Return joints, parents first; numbers (T, C) of the frames; the rate [1/s]. Raises ValueError."""
     _expect(lines, "HIERARCHY")
     joints = _hierarchy(lines)
     columns = joints[-1].first + len(joints[-1].channels)
@@ -162,9 +150,9 @@ def _hierarchy(lines: Iterator[list[str]]) -> list[Joint]:
         elif word == "offset" and open_joints:
             joints[open_joints[-1]].offset = np.array(finite_numbers(words, 3))
         elif word == "channels" and open_joints[-1:] == [len(joints) - 1] and not joints[-1].channels:
-            joints[-1].channels = tuple(CHANNELS.get(word.lower(), "") for word in words[1:])
+            joints[-1].channels = tuple(word.capitalize() for word in words[1:])
             columns += len(joints[-1].channels)
-            known = set(joints[-1].channels) - {""}
+            known = CHANNELS.intersection(joints[-1].channels)
             if not words[:1] == [str(len(words) - 1)] == [str(len(known))]:
                 raise ValueError(f"'{' '.join(line)[:60]}' declares other channels than it names")
         elif word == "}" and open_joints:

@@ -215,9 +215,7 @@ def gait_flights(stride: Stride, phase: np.ndarray, size: np.ndarray) -> list[tu
     """Return (start, end) [s] from each toe-off to the other foot's contact, where `size` is nearly 1."""
     time = np.arange(len(phase)) / RATE
     flights: list[tuple[float, float]] = []
-    if stride.toe_off >= 50.0:
-        return flights
-    for step in np.arange(0.0, phase[-1] - 0.5, 0.5):
+    for step in np.arange(0.0, phase[-1] - 0.5, 0.5) if stride.toe_off < 50.0 else ():
         start, end = np.interp((step + stride.toe_off / 100.0, step + 0.5), phase, time)
         if np.interp((start, end), time, size).min() > 0.8:
             flights.append((float(start), float(end)))
@@ -249,10 +247,8 @@ def twist(degrees: float, hertz: float, hips: float, stop: float) -> Frames:
     time = np.minimum(time, round(stop * LIBRARY_FPS) / LIBRARY_FPS)
     yaw = degrees * np.sin(2 * np.pi * hertz * time) * smoothstep(time / ONSET)
     poses = poses_from_angles(STANCE, len(time))
-    for name, share in (
-        ("pelvis", hips),
-        *((name, share * (1.0 - hips)) for name, share in SPINE_SHARES),
-    ):
+    shares = {"pelvis": hips} | {name: share * (1.0 - hips) for name, share in SPINE_SHARES}
+    for name, share in shares.items():
         turn = Rotation.from_euler("y", (share * yaw)[:, None], degrees=True).as_matrix()
         poses[:, JOINT[name]] = axis_angles(turn @ rotation_matrices(poses[:, JOINT[name]]))
     translations = np.zeros((len(time), 3))
@@ -272,9 +268,6 @@ def turning_walk(degrees: float, hertz: float, pace: float, stop: float) -> Fram
     poses, path = poses[::EVERY], path[::EVERY]
     frozen = np.minimum(np.arange(len(poses) + FROZEN_FRAMES), len(poses) - 1)
     return poses[frozen], path[frozen] - path[0] * [1.0, 0.0, 1.0]
-
-
-Made = tuple[str, str, Callable[[], Frames]]  # kind, source, function
 
 
 ACTIONS_FILE = Path(__file__).with_name("actions.toml")
@@ -297,7 +290,7 @@ STOPS: dict[str, Callable[[], Frames]] = {
     "turning_stop": partial(turning_walk, 32.0, 0.45, 0.95, 2.4),
 }
 CURVES = "normative gait curves"
-MADE: dict[str, Made] = {
+MADE: dict[str, tuple[str, str, Callable[[], Frames]]] = {  # kind, source, function
     **{
         name: (table.pop("kind"), "key angles", partial(act, **table))
         for name, table in tomllib.loads(ACTIONS_FILE.read_text(encoding="utf-8")).items()

@@ -17,7 +17,9 @@ never meets. Shape coefficients and soft tissue are left out: shape is the calle
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from fnmatch import fnmatch
 from pathlib import Path
 
@@ -118,6 +120,7 @@ HANDS = [JOINT[f"{side}_{joint}"] for side in ("left", "right") for joint in ("w
 NAME = re.compile(r"\w[\w.+()-]*( [\w.+()-]+)*")
 MAX_NAME_BYTES = 100
 SHAPE_FILES = ("shape.npz", "*_stagei.npz")  # of a subject: AMASS keeps them beside its clips
+CMU_FILE = re.compile(r"(\d+_\d+)(_poses|_stageii)?")  # CMU's number of a clip; AMASS adds to it
 
 
 def load_motions(path: str | Path, *, options: MotionFileOptions | None = None) -> list[Motion]:
@@ -126,7 +129,8 @@ def load_motions(path: str | Path, *, options: MotionFileOptions | None = None) 
     Each comes back whole, at 30 frames per second, placed on the floor at the origin facing +z, with the
     arms spread by `clear_arms` and the hands' rotations at a tenth. CMU files (.amc) need their skeleton
     (.asf) beside them. Of a folder, a subject's shape as AMASS keeps it beside the clips (SHAPE_FILES) is
-    left out.
+    left out. With the option `split` its clips alone are read, named by their numbers; one
+    that cannot be read is left out with a warning.
 
     Raises:
         MotionError: one line with file, element and remedy, for anything that cannot be read.
@@ -139,19 +143,36 @@ def load_motions(path: str | Path, *, options: MotionFileOptions | None = None) 
     >>> motion.name, motion.frames, motion.fps
     ('standing', 31, 30.0)
     """
-    path, known = Path(path), ", ".join(READERS)
+    path, known, options = Path(path), ", ".join(READERS), options or MotionFileOptions()
     if not path.exists():
         raise MotionError(f"{path}: no such file or folder; give a motion file ({known}) or a folder")
     files = [path]
     if path.is_dir():
-        listed = sorted(file for file in path.iterdir() if file.suffix.lower() in READERS)
+        found = path.rglob("*") if options.split else path.iterdir()
+        listed = sorted(file for file in found if file.suffix.lower() in READERS)
         files = [f for f in listed if not any(fnmatch(f.name, shape) for shape in SHAPE_FILES)]
-    if not files:
-        raise MotionError(
-            f"{path}: holds no motion file ({known}); give a folder of motion capture clips"
-        )
-    options = options or MotionFileOptions()
-    return [clear_arms(resample(place(read_motion(file, options)))) for file in files]
+    names = {file: file.stem for file in files}
+    if options.split:
+        numbers = {file: CMU_FILE.fullmatch(name) for file, name in names.items()}
+        wanted = options.clips("train", "test")
+        names = {file: number[1] for file, number in numbers.items() if number and number[1] in wanted}
+    if not names:
+        what = f"file of a clip of split {options.split}" if options.split else "motion file"
+        raise MotionError(f"{path}: holds no {what} ({known}); give a folder of motion capture clips")
+    for name in names.values():
+        if len(same := [str(file) for file in names if names[file] == name]) > 1:
+            raise MotionError(f"{path}: {name} is in {' and '.join(same)}: leave one")
+    motions = []
+    for file, name in names.items():
+        try:
+            motion = clear_arms(resample(place(read_motion(file, options))))
+        except MotionError as error:
+            if not options.split:
+                raise
+            warnings.warn(f"{error} (left out of split {options.split})", stacklevel=2)
+        else:
+            motions.append(replace(motion, name=name))
+    return motions
 
 
 def read_motion(file: Path, options: MotionFileOptions) -> Motion:

@@ -7,7 +7,7 @@ docs/protocol.md. Nothing heavy is loaded before a motion is made, so that names
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
@@ -37,13 +37,10 @@ class Clip(NamedTuple):
     digest: str
 
 
-def _clips() -> Iterator[tuple[str, Clip]]:
-    with CLIPS_FILE.with_suffix(".csv").open(encoding="utf-8", newline="") as file:
-        for row in csv.DictReader(file):
-            yield row["clip"], Clip(row["content"], int(row["frames"]), row["digest"])
-
-
-CLIPS = dict(_clips())
+CLIPS = {
+    row["clip"]: Clip(row["content"], int(row["frames"]), row["digest"])
+    for row in csv.DictReader(CLIPS_FILE.with_suffix(".csv").read_text(encoding="utf-8").splitlines())
+}
 # Validation and test clips of more than 150 frames are cut into so many segments of equal length.
 SEGMENTS_OF = {"01_01": 7, "02_07": 6, "05_02": 3, "06_02": 2}
 
@@ -56,14 +53,11 @@ class Segment(NamedTuple):
     stop: int
 
 
-def _cut(clip: str, count: int) -> Iterable[tuple[str, Segment]]:
-    frames = CLIPS[clip].frames
-    edges = [frames * place // count for place in range(count + 1)]
-    for letter, start, stop in zip("abcdefgh", edges, edges[1:]):
-        yield f"{clip}_{letter}", Segment(clip, start, stop)
-
-
-SEGMENTS = {name: segment for clip, count in SEGMENTS_OF.items() for name, segment in _cut(clip, count)}
+SEGMENTS = {
+    f"{clip}_{letter}": Segment(clip, *(CLIPS[clip].frames * edge // count for edge in (part, part + 1)))
+    for clip, count in SEGMENTS_OF.items()
+    for part, letter in enumerate("abcdefgh"[:count])
+}
 
 
 def clip_of(name: str) -> str:
@@ -136,10 +130,9 @@ def make_motion(name: str) -> Motion:
 
 
 def _read_clip(name: str) -> Motion:
+    parts = ("poses", "translations", "source")
     with np.load(CLIPS_FILE) as file:  # reads what is asked for
-        poses, translations, source = (
-            file[f"{name}/{part}"] for part in ("poses", "translations", "source")
-        )
+        poses, translations, source = (file[f"{name}/{part}"] for part in parts)
     source = f"CMU motion capture: {source}"
     return Motion(name, poses, translations, kind=CLIPS[name].content, source=source)
 

@@ -44,8 +44,8 @@ class Motion:
 
     >>> import numpy as np
     >>> standing = Motion("standing", poses=np.zeros((60, 24, 3)), translations=np.zeros((60, 3)))
-    >>> standing.frames, round(standing.duration, 2)
-    (60, 1.97)
+    >>> standing.frames, standing.fps
+    (60, 30.0)
     """
 
     name: str
@@ -79,11 +79,6 @@ class Motion:
         """Number of frames."""
         return len(self.poses)
 
-    @property
-    def duration(self) -> float:
-        """Time [s] from the first frame to the last."""
-        return (self.frames - 1) / self.fps
-
     def cut(self, start: int, stop: int) -> Motion:
         """Return frames start to stop - 1. Raises MotionError when nothing is left."""
         return replace(self, poses=self.poses[start:stop], translations=self.translations[start:stop])
@@ -96,9 +91,8 @@ class Motion:
                 "resample it"
             )
         poses = np.concatenate([self.poses, other.poses])
-        return replace(
-            self, poses=poses, translations=np.concatenate([self.translations, other.translations])
-        )
+        translations = np.concatenate([self.translations, other.translations])
+        return replace(self, poses=poses, translations=translations)
 
 
 def spread_arms(motion: Motion, degrees: float = 20.0) -> Motion:
@@ -140,7 +134,7 @@ def resample(motion: Motion, fps: float = 30.0) -> Motion:
     """
     if motion.frames == 1 or fps == motion.fps:
         return replace(motion, fps=fps)
-    intervals = max(1, round(motion.duration * fps))
+    intervals = max(1, round((motion.frames - 1) / motion.fps * fps))
     at = np.linspace(0.0, motion.frames - 1.0, intervals + 1)
     left = np.minimum(at.astype(int), motion.frames - 2)
     share = at - left

@@ -113,13 +113,12 @@ def root_path(
     time = np.arange(len(poses)) / RATE
     for start, end in flights:
         inside = (time > start) & (time < end)
-        fall = 0.5 * FREE_FALL * (time - start) * (end - time)
-        height[inside] = (np.interp(time, (start, end), np.interp((start, end), time, height)) + fall)[
-            inside
-        ]
+        flight = time[inside]
+        line = np.interp(flight, (start, end), np.interp((start, end), time, height))
+        height[inside] = line + 0.5 * FREE_FALL * (flight - start) * (end - flight)
         for axis in (0, 1):
             ends = np.interp((start, end), time, velocity[:, axis])
-            velocity[inside, axis] = np.interp(time[inside], (start, end), ends)
+            velocity[inside, axis] = np.interp(flight, (start, end), ends)
     velocity = gaussian_filter1d(velocity, speed_smoothing * RATE, axis=0, mode="nearest")
     height = gaussian_filter1d(height, height_smoothing * RATE, mode="nearest")
     path = np.zeros((len(poses), 3))

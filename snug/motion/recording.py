@@ -87,7 +87,6 @@ MAX_ROOT_SPEED = 10.0  # [m/s] of the root: a sprinter's speed
 MAX_ANGLE = 4.0 * np.pi  # [rad] of all joints but the root, whose turns may have been added up
 MAX_ROOT_ANGLE = 1e3  # [rad] of the root
 MAX_DISTANCE = 1e4  # [m]
-MAX_NAMED = 4  # joints in a message
 
 
 def check_recording(motion: Motion) -> None:
@@ -107,7 +106,7 @@ def check_recording(motion: Motion) -> None:
         if jumps.any()
     ]
     if errors:
-        first = ", ".join(errors[:MAX_NAMED])
+        first = ", ".join(errors[:4])
         raise MotionError(f"jumps, first of {first}; cut the clip there, or check frame rate and units")
 
 

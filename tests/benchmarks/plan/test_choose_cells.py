@@ -10,7 +10,7 @@ from benchmarks.metrics import measured_in
 from benchmarks.plan.choose_cells import expanded, matching
 from benchmarks.plan.motions import Motions, split_motions
 from benchmarks.plan.plan import make_plan
-from benchmarks.plan.study import read_study
+from benchmarks.plan.study import StudyError, read_study
 from benchmarks.presets import find_preset
 from benchmarks.scenes import GARMENT_SCENES
 from snug.motion.library import DYNAMIC_TEST
@@ -123,6 +123,15 @@ def test_motions_are_divided_as_help_says():
     assert motions.train[:2] == ("05_12", "a") and not {"01_01", "05_02"} & set(motions.train)
     assert "05_12" not in divided(["05_12"]).train
     assert "05_04" not in divided(test_motions=["01_01", "05_04"]).train
+
+
+def test_a_published_split_divides_the_motions():
+    split = {"motion_files.split": "snug"}
+    motions = divided(["02_04", "01_01", "91_62", "07_02"], **split)
+    assert (motions.train, motions.measured) == (("02_04", "91_62"), ("01_01", "07_02"))
+    assert divided(["02_04", "01_01", "07_02"], test_motions="07_02", **split).train == ("02_04",)
+    with pytest.raises(StudyError, match="split: no test clip can be read: 01_01, 07_02, 55_27, 104_54"):
+        divided(["02_04"], **split)
 
 
 def test_a_recipe_is_never_chosen_by_the_test_motions():

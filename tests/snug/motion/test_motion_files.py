@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from snug.body.skeleton import JOINT
+from snug.file_options import SPLITS, MotionFileOptions
 from snug.motion.files import HAND_DAMPING, HANDS, load_motions
 from snug.motion.library import make_motion
 from snug.motion.motion import Motion, clear_arms, place, resample, transition
@@ -99,6 +100,27 @@ def test_paths_without_a_motion_are_refused(tmp_path):
     empty.mkdir()
     refuse(notes, "unknown kind")
     refuse(empty, "holds no")
+
+
+def test_a_published_split_is_read_by_number_from_folders_of_cmu_and_amass(tmp_path):
+    amass, cmu = tmp_path / "01", tmp_path / "07"
+    for name in ("01_01_poses", "91_62_stageii", "01_01_stagei", "01_02_poses", "shape", "mine_91_61"):
+        amass.mkdir(exist_ok=True)
+        write(amass / f"{name}.npz", KICK)
+    cmu.mkdir()
+    write_clip(cmu, [amc_frame(1)] * 3).rename(cmu / "07_02.amc")
+    write(cmu / "128_02.npz", KICK, poses=np.degrees(KICK.poses))
+    with pytest.warns(UserWarning, match=r"128_02.npz: .* not degrees \(left out of split snug\)"):
+        motions = load_motions(tmp_path, options=MotionFileOptions(split="snug"))
+    assert [motion.name for motion in motions] == ["01_01", "91_62", "07_02"]
+    write(cmu / "01_01.npz", KICK)
+    refuse(tmp_path, "01_01 is in .*01_01_poses.npz and .*01_01.npz: leave one", split="snug")
+    refuse(amass / "01_02_poses.npz", "holds no file of a clip of split hood", split="hood")
+
+
+def test_splits_are_those_of_the_papers():
+    sizes = {name: [len({*s["train"]}), len({*s["train"], *s["test"]})] for name, s in SPLITS.items()}
+    assert sizes == {"snug": [52, 52 + 4], "hood": [52, 52 + 8]}
 
 
 def test_a_rate_is_said_once(tmp_path):

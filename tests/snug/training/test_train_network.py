@@ -99,6 +99,14 @@ def test_motions_that_validate_do_not_train():
     assert [motion.name for motion in training] == list(TRAIN)
 
 
+def test_test_clips_of_a_published_split_do_not_train(tmp_path, capsys):
+    for name in ("01_01", "02_04", "05_16"):
+        np.savez(tmp_path / f"{name}.npz", poses=np.zeros((12, 72)), trans=np.zeros((12, 3)), fps=30.0)
+    [training], _ = choose_motions(parse_options(["--motions", f"{tmp_path},split=snug"]))
+    assert training.name == "02_04"
+    assert "54 of 56 clips are absent: 07_02, 55_27, 104_54, 02_05," in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "hint"),
     [
