@@ -94,7 +94,8 @@ def _search_groups(some, points, samples, exact, mesh, pose, faces, barycentric,
 
     Writes who found none into missed (S,) and returns how many.
     """
-    # One long function: in three of them, for each group, the search took a tenth longer.
+    # One long function: in three of them, for each group, the search took a tenth longer; in inlined ones,
+    # each of whose arguments is counted again, up to ten times as long where few faces are allowed.
     # Out of their tuples once: each time that an array is taken from one, its references are counted.
     order, ascending, centroids, corners = mesh.order, mesh.ascending, mesh.centroids, mesh.corners
     place, boxes, fitted, slabs, lanes = mesh.place, mesh.boxes, mesh.fitted, mesh.slabs, mesh.lanes
