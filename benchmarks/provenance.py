@@ -36,9 +36,8 @@ def commit() -> str:
     # No lock on the index: one would stay there where the disk is full. A tag is no commit.
     command = ["git", "--no-optional-locks", "-C", str(ROOT), "describe", "--always", "--abbrev=10"]
     command += ["--exclude=*", "--dirty=+changes"]
-    with suppress(
-        OSError, subprocess.SubprocessError
-    ):  # no git here: the installed version is what is known
+    # No git here: the installed version is what is known.
+    with suppress(OSError, subprocess.SubprocessError):
         if (ROOT / ".git").exists():
             done = subprocess.run(command, capture_output=True, text=True, timeout=20, check=True)
             return done.stdout.strip()

@@ -157,9 +157,8 @@ def plan_score(
 
         scenes = [declared(stored, str(rest_mesh))]
         scene = scenes[0].name
-    parts = {
-        name: replace(part, cases=()) for name, part in study.parts.items()
-    }  # some have a scene's name
+    # Some have a scene's name.
+    parts = {name: replace(part, cases=()) for name, part in study.parts.items()}
     plan = make_plan(
         replace(study, parts=parts, scenes=(scene,), methods=MEASURED_BESIDE, rollouts={name: stored}),
         folder=folder, command=command_line, scenes=scenes,

@@ -121,9 +121,8 @@ def choose_pins(which: str | None, positions: np.ndarray) -> list[int]:
 
 def read_obstacle(options: argparse.Namespace) -> Obstacle:
     """Return the obstacle of its files. Raises ValueError that names the file, and the remedy."""
-    from reference_sim.obstacle import (
-        Obstacle,
-    )  # its search for contact serves no cloth that meets nothing
+    # Its search for contact serves no cloth that meets nothing.
+    from reference_sim.obstacle import Obstacle
 
     positions, surface = read_sequence(options.obstacle)
     axes, rest = {"units": options.units, "up": options.up}, None

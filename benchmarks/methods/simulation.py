@@ -68,9 +68,8 @@ class Simulation(Method):
             pin_positions=scene.pin_positions,
             progress=progress,
         )
-        return replace(
-            trajectory, times=scene.dt * np.arange(float(trajectory.frames))
-        )  # also of slow steps
+        # Also of slow steps.
+        return replace(trajectory, times=scene.dt * np.arange(float(trajectory.frames)))
 
 
 def make_simulation(*, models: Path, seed: int, **options: Any) -> Simulation:

@@ -69,9 +69,8 @@ def hem_yaw(hem: Array, axes: Array) -> Array:
     hem: (T,H,3) in the root's axes; axes: (T,3,3) root to world.
     """
     world = np.einsum("tij,tvj->tvi", axes, hem)
-    flat = (world - world.mean(axis=1, keepdims=True))[
-        ..., [2, 0]
-    ]  # z, x: the yaw is positive from z to x
+    # z, x: the yaw is positive from z to x.
+    flat = (world - world.mean(axis=1, keepdims=True))[..., [2, 0]]
     z = flat[..., 0] + 1j * flat[..., 1]
     # The rotation about the centroid nearest to frame 0's shape in the sense of least squares.
     return np.unwrap(np.angle((z * z[0].conj()).sum(axis=1)))

@@ -145,15 +145,10 @@ def nearest(word: str, names: Sequence[str], otherwise: str = "see --list") -> s
 FILE = "study.toml"  # of a study that is a folder
 PACKAGED = Path(__file__).parents[1] / "studies"
 FOLDERS = (Path("studies"), Path(__file__).parents[2] / "studies")  # of studies that bring code
-HIDDEN = {
-    Study: ("written",),
-    Preset: ("name", "description"),
-    RollOutOption: ("role",),
-}  # no file has them
-WORDS_FOR_TABLES = {
-    "garment": "path",
-    "sizes": "base",
-}  # table -> the field that a word in its place means
+# No file has them.
+HIDDEN = {Study: ("written",), Preset: ("name", "description"), RollOutOption: ("role",)}
+# Table -> the field that a word in its place means.
+WORDS_FOR_TABLES = {"garment": "path", "sizes": "base"}
 PATHS = ("body", "trained", "motions", "path", "material")  # fields that hold paths
 KINDS = {str: "text", int: "a whole number", float: "a number", bool: "true or false"}
 Table = Mapping[str, Any]

@@ -68,9 +68,8 @@ def run_cell(cell: Cell, least: float, context: Context, needed: Needed) -> Outc
     try:
         return compute_cell(cell, least, context)
     except Exception as error:
-        for name in files_of(
-            cell, context.folder
-        ):  # nobody is to look at the frames of a cell that failed
+        # Nobody is to look at the frames of a cell that failed.
+        for name in files_of(cell, context.folder):
             (context.folder.path / name).unlink(missing_ok=True)
         return replace(failure(error), result={"peak": peak_memory()})
 

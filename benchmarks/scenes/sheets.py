@@ -26,11 +26,8 @@ DT = 1.0 / 30.0  # [s]
 SIZE = 0.4  # [m]
 VELOCITY = np.array([0.7, 2.0, -0.3])  # [m/s] of the fall
 SWING, PERIOD = 0.15, 1.0  # [m] to either side, [s] of the flag's pole
-RADIUS, DRAPED_SIZE, GAP = (
-    0.12,
-    0.5,
-    0.02,
-)  # [m] of the sphere, of the sheet on it, between both at the start
+# [m] of the sphere, of the sheet on it, between both at the start.
+RADIUS, DRAPED_SIZE, GAP = 0.12, 0.5, 0.02
 
 
 def _built(scene: Scene, cloth: Cloth, frames: int, start: np.ndarray, **further: Any) -> BuiltScene:
@@ -82,9 +79,8 @@ def build_hanging_sheet(
 def build_flag(scene: Scene, assets: object = None, *, sheet_cells: int, sheet_frames: int) -> BuiltScene:
     """Build the scene of a flag whose pole is swung to and fro: its pinned edge alone moves it."""
     flat, faces = square_sheet(sheet_cells, SIZE)
-    positions = np.stack(
-        [flat[:, 0], -flat[:, 2], flat[:, 1]], axis=1
-    )  # upright, in the plane of x and y
+    # Upright, in the plane of x and y.
+    positions = np.stack([flat[:, 0], -flat[:, 2], flat[:, 1]], axis=1)
     pole = np.arange(sheet_cells + 1)  # the edge at the smallest x
     cloth = Cloth(positions, faces, Material(), pins=pole)
 

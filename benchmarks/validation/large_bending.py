@@ -186,9 +186,8 @@ def _ratio(rows: int, where: str, slender: float) -> float:
         forces[:, 1] = -exact * cloth.vertex_areas / width
     else:
         tip = np.flatnonzero(points[:, 0] > 1 - 1e-9)
-        share = (
-            1.0 - (2 * np.abs(points[tip, 1]) / width) ** 2
-        )  # shear of a beam: least at the free edges
+        # Shear of a beam: least at the free edges.
+        share = 1.0 - (2 * np.abs(points[tip, 1]) / width) ** 2
         forces[tip, 1] = -exact * share / share.sum()
     return buckling_factor(cloth, forces)
 
@@ -202,9 +201,8 @@ def buckling_factor(cloth: sim.Cloth, forces: np.ndarray) -> float:
     import scipy.sparse.linalg as spla
 
     strain, stiff = energies.StretchStVK(cloth), energies.BendHinge(cloth)
-    stiff.stiffness = (
-        1e5 * stiff.stiffness
-    )  # keeps the loaded strip in its plane, where hinges do no work
+    # Keeps the loaded strip in its plane, where hinges do no work.
+    stiff.stiffness = 1e5 * stiff.stiffness
     flat = minimum([strain, stiff, DeadLoad(cloth, forces)], cloth.rest_positions, tolerance=1e-9)
     free = np.flatnonzero(cloth.free)
 
@@ -262,9 +260,8 @@ def lifted(
     columns = round(2 * np.pi / width * rows * (ROW if family == "equilateral" else 1.0))
     flat, faces = rectangle(family, columns, rows, 2 * np.pi, width)
     h = 2 * np.pi / (columns - 0.5)
-    turn = (
-        flat[:, 0] * columns / (columns - 0.5) - h / 2
-    )  # the clamp: half-way between two pinned columns
+    # The clamp: half-way between two pinned columns.
+    turn = flat[:, 0] * columns / (columns - 0.5) - h / 2
     radius = INNER * np.exp(flat[:, 1])
     rest = np.stack([radius * np.cos(turn), 0.0 * turn, -radius * np.sin(turn)], axis=1)
     cloth = sim.Cloth(rest, faces, material, pins=np.flatnonzero(turn < 0.6 * h))

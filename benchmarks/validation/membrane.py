@@ -58,9 +58,8 @@ def vector_basis(points: np.ndarray, faces: np.ndarray, intorder: int) -> Any:
 
 STRETCH, SHEAR = 1.3, 0.4
 NARROWED = COTTON.lame_lambda / (COTTON.lame_lambda + 2 * COTTON.lame_mu)  # nu2
-UNIAXIAL = np.diag(
-    [STRETCH, np.sqrt(1 - NARROWED * (STRETCH**2 - 1))]
-)  # the lateral stretch of no stress
+# The lateral stretch of no stress.
+UNIAXIAL = np.diag([STRETCH, np.sqrt(1 - NARROWED * (STRETCH**2 - 1))])
 
 
 @known_answer(

@@ -188,9 +188,8 @@ class GaussianCurvature(energies.Energy):
 
     def __init__(self, cloth: sim.Cloth, stiffness: float) -> None:
         self.cloth = cloth
-        corners = np.stack(
-            [np.roll(cloth.faces, -k, axis=1) for k in range(3)], axis=1
-        )  # tip, next, last
+        # Tip, next, last.
+        corners = np.stack([np.roll(cloth.faces, -k, axis=1) for k in range(3)], axis=1)
         on_border = np.isin(cloth.faces, np.concatenate(boundary_loops(cloth.faces)))
         self.stencils = corners[on_border]
         self.stiffness = stiffness

@@ -65,10 +65,11 @@ class StretchStVK(Energy):
         area = torch.as_tensor(self.areas).to(u)
         first, second = u[..., 1, :] - u[..., 0, :], u[..., 2, :] - u[..., 0, :]
         # Entry by entry: hundreds of thousands of small matrix products take a GPU ten times as long.
+        # The columns of F.
         along, across = (
             first * Dm_inverse[..., 0, column, None] + second * Dm_inverse[..., 1, column, None]
             for column in range(2)
-        )  # the columns of F
+        )
         G00, G11 = 0.5 * ((along * along).sum(-1) - 1), 0.5 * ((across * across).sum(-1) - 1)
         G01 = 0.5 * (along * across).sum(-1)
         trace_of_square = G00**2 + G11**2 + 2 * G01**2

@@ -187,9 +187,8 @@ def winding_numbers(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray)
     axes = [(along + 1) % 3, (along + 2) % 3, along]  # the ray runs along the last
     x, rays = np.ascontiguousarray(vertices[:, axes]), np.ascontiguousarray(points[inside][:, axes])
     sides = np.maximum((high - low)[axes[:2]], np.finfo(float).tiny)
-    cells = np.maximum(np.sqrt(len(faces) * sides / sides[::-1]), 1.0).astype(
-        np.int64
-    )  # as many as faces
+    # As many as faces.
+    cells = np.maximum(np.sqrt(len(faces) * sides / sides[::-1]), 1.0).astype(np.int64)
     starts, met = _faces_of_cells(x, faces, low[axes], cells / sides, cells)
     numbers[inside] = _crossings(x, faces, rays, low[axes], cells / sides, cells, starts, met)
     return numbers

@@ -152,9 +152,8 @@ BatchKernel = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
 def batch_kernel(kernel: Any, stencils: np.ndarray, *constants: Any) -> BatchKernel:
     """Bind a compiled function (x, stencils, *constants, values, gradients) of flat arrays to an energy."""
-    stencils = stencils.astype(
-        np.uint32
-    )  # for a signed index is first asked whether it counts from the end
+    # For a signed index is first asked whether it counts from the end.
+    stencils = stencils.astype(np.uint32)
 
     def run(x: np.ndarray, gradients: np.ndarray) -> np.ndarray:
         values = np.empty((len(x), TRAINING_LANES), np.float32)

@@ -26,9 +26,8 @@ from reference_sim.minimise.descent import (
 from reference_sim.potential import Potential
 
 HALVINGS = 12  # of a step before its direction is given up
-INERTIA, WEIGHT, ELEMENTS = range(
-    3
-)  # places of energies: the terms of elements come last, in their order
+# Places of energies: the terms of elements come last, in their order.
+INERTIA, WEIGHT, ELEMENTS = range(3)
 
 # What is constant of the vertices: inertia [N/m] and weights [N] (V,); pinned: 3 times the vertex.
 Vertices = namedtuple("Vertices", "inertia weights pinned")
@@ -284,9 +283,8 @@ def _factor(free: np.ndarray, rest: np.ndarray, terms: StepTerms) -> tuple[Any, 
     changing = [(k, lanes) for k, lanes in enumerate(terms.kernels) if lanes.stiffness is not None]
     stencils = [number[e.stencils] for e in fixed] + [number[lanes.stencils] for _, lanes in changing]
     pattern = ScalarPattern(int(free.sum()), stencils)
-    constant = np.zeros(
-        len(pattern.row_columns) + pattern.count
-    )  # left of the diagonal, then the diagonal
+    # Left of the diagonal, then the diagonal.
+    constant = np.zeros(len(pattern.row_columns) + pattern.count)
     for energy in fixed:
         elements, values = energy.scalar_stiffness(rest)
         places = pattern.places(number[energy.stencils[elements]])

@@ -49,10 +49,8 @@ def stress_tests(run: Run) -> pd.DataFrame:
 def counted(run: Run) -> dict[str, Counter[str]]:
     """Count by status how the cells, checks and stress tests of the run ended."""
     cells = run.frame[(run.frame["case"] == "") & (run.frame["method"] != "")]
-    best_first = {
-        "stalled": 0,
-        "ok": 1,
-    }  # what has any usable number has run, whatever became of the others
+    # What has any usable number has run, whatever became of the others.
+    best_first = {"stalled": 0, "ok": 1}
     cells = cells.sort_values("status", key=lambda s: s.map(best_first).fillna(2), kind="stable")
     judged = checks(run)
     groups = {

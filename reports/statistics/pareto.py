@@ -17,9 +17,8 @@ WHOLE = "cost/whole"  # TIME is a method's own work; this is all from pose to wo
 ERRORS = (
     "gap/energy", "step/curvature", "step/distance", "curvature/histogram", "distance/rms", "curvature/error",
 )  # fmt: skip
-PLANES = {
-    "gap/energy": "gap/refrozen"
-}  # what the reference leaves where its planes are searched at its end
+# What the reference leaves where its planes are searched at its end.
+PLANES = {"gap/energy": "gap/refrozen"}
 SMALLER_STEPS = "simulation-dt"  # a family of another problem: its steps have another potential
 # Of the step's own potential, which another step size changes.
 OWN_STEP = ("gap/energy", "step/curvature", "step/distance")

@@ -147,9 +147,8 @@ def _skeleton(arrays: Arrays, count: int) -> tuple[np.ndarray, np.ndarray, np.nd
     for joint in range(BODY_JOINTS, joints):
         if (parent := int(parents[joint])) in FOLDED:
             folded[joint, FOLDED[parent]] = 1.0
-            places[FOLDED[parent], joint] = (
-                parent != FOLDED[parent]
-            )  # knuckles; the head stays where it is
+            # Knuckles; the head stays where it is.
+            places[FOLDED[parent], joint] = parent != FOLDED[parent]
         else:
             folded[joint] = folded[parent]
     knuckles = places.sum(axis=1, keepdims=True)

@@ -165,9 +165,8 @@ def _torso(sections: _Sections, edges: Index, hang: float, growth: Array, narrow
     y = sections.nodes[1]
     support = sections.support(edges, 1)
     mirrored = (SUPPORT_DIRECTIONS // 2 - np.arange(SUPPORT_DIRECTIONS)) % SUPPORT_DIRECTIONS
-    support = np.maximum(
-        support, support[:, mirrored]
-    )  # both sides of a body that is not quite symmetric
+    # Both sides of a body that is not quite symmetric.
+    support = np.maximum(support, support[:, mirrored])
     below = np.flatnonzero(y <= hang)
     fall = narrowing * y[below, None]
     support[below] = np.maximum.accumulate((support[below] - fall)[::-1], axis=0)[::-1] + fall

@@ -190,9 +190,8 @@ def mesh_garment(
     sheet, sheet_faces = cut_sheet(surface, cuts)
     curves = outlines(sheet, sheet_faces, cuts)
     names = sorted(name for loop in curves for name, _ in loop)
-    expected = [
-        cut.name for cut in cuts
-    ]  # the seam runs down front and back; of trousers the two are one
+    # The seam runs down front and back; of trousers the two are one.
+    expected = [cut.name for cut in cuts]
     if names not in (sorted([SEAM, *expected]), sorted(expected)) or [SEAM] in [
         [n for n, _ in c] for c in curves
     ]:
@@ -247,9 +246,8 @@ def _keep_off(body: Body, points: Array, faces: Index, cuts: list[CutPlane], cle
     for _ in range(30):
         corners = points[faces]
         middles = 0.5 * (corners + np.roll(corners, 1, axis=1))
-        samples = np.concatenate(
-            [corners, middles, corners.mean(axis=1, keepdims=True)], axis=1
-        )  # (F,7,3)
+        # (F,7,3)
+        samples = np.concatenate([corners, middles, corners.mean(axis=1, keepdims=True)], axis=1)
         squared, nearest, closest = tree.squared_distance(skin, skin_faces, samples.reshape(-1, 3))
         away = samples.reshape(-1, 3) - closest
         side = np.sign(np.sum(away * outward[nearest], axis=1))  # a chord may run inside of the body

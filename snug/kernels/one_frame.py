@@ -43,9 +43,8 @@ def skin_frame(
     transforms (J, 3, 4), pelvis (3,) [m], float64; all other real numbers are float32.
     """
     count, padded = len(order), rest.shape[1]
-    u = np.empty(
-        6 * VERTEX_BLOCK, np.float32
-    )  # points and their images: nothing overlaps in one small array
+    # Points and their images: nothing overlaps in one small array.
+    u = np.empty(6 * VERTEX_BLOCK, np.float32)
     for b in range(len(first) - 1):
         for c in range(3):
             for i in range(VERTEX_BLOCK):

@@ -48,9 +48,8 @@ class DressedBody:
             if smoothing:
                 sweeps = max(1, round(smoothing * self.vertices / 1000))
                 weights = smooth_weights(weights, self.garment.faces, sweeps)
-                weights[self.garment.pins] = borrowed[
-                    self.garment.pins
-                ]  # where the simulator's handles are
+                # Where the simulator's handles are.
+                weights[self.garment.pins] = borrowed[self.garment.pins]
             self._weights[smoothing] = torch.as_tensor(np.asarray(weights), dtype=torch.float32)
         return self._weights[smoothing]
 

@@ -158,9 +158,8 @@ class TwoBranches(StaticBranch):
         count = round(EXCHANGED * len(features)) if self.training else 0
         if count < 2:
             return self.decode(static + dynamic), after
-        strange = static[:count].detach() + dynamic[:count].detach().roll(
-            1, 0
-        )  # windows are drawn at random
+        # Windows are drawn at random.
+        strange = static[:count].detach() + dynamic[:count].detach().roll(1, 0)
         offsets = self.decode(torch.cat([strange, static[count:] + dynamic[count:]]))
         early, late = offsets[:count].tensor_split([JUDGED_BY_INERTIA], dim=1)
         return torch.cat([torch.cat([early, late.detach()], 1), offsets[count:]]), after

@@ -43,9 +43,8 @@ class FitAndWrinkles(GarmentNetwork):
         """Return offsets (N, T, V, 3) [m] and the state (1, N, 1500) after the last frame."""
         normalised = self.normalise(features)
         fast, drape = self.closed_form, cast(nn.Linear, self.fit[-1])
-        hidden, state = run_gru(
-            self.gru, normalised, state, closed_form=fast
-        )  # (N, T, 1500), (1, N, 1500)
+        # (N, T, 1500), (1, N, 1500)
+        hidden, state = run_gru(self.gru, normalised, state, closed_form=fast)
         shape = self.fit[:-1](normalised[..., -SHAPES:])
         flat = run_linear(drape, shape, closed_form=fast) + run_linear(
             self.offsets, hidden, closed_form=fast

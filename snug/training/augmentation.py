@@ -34,9 +34,8 @@ BODY_PARTS: tuple[tuple[str, ...], ...] = (
     ("left_collar", "left_shoulder", "left_elbow", "left_wrist", "left_hand"),
     ("right_collar", "right_shoulder", "right_elbow", "right_wrist", "right_hand"),
 )
-PART_SCALES = dict.fromkeys(
-    (1, 2, 3), (0.6, 1.3)
-)  # of legs and spine; an arm swung further might enter the torso
+# Of legs and spine; an arm swung further might enter the torso.
+PART_SCALES = dict.fromkeys((1, 2, 3), (0.6, 1.3))
 # Degrees between upper arm and spine where an arm of a clip comes nearest. The lower end is where
 # recorded arms are spread to (snug.motion.motion.ARMS_CLEAR): nearer, a sleeve is pinched and no shape is
 # good.

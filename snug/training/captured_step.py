@@ -124,9 +124,8 @@ class CapturedTrainer(Trainer):
         """Follow the gradients, and keep the places of the anchors."""
         held = self._held
         taught = [p for p in self.network.parameters() if p.grad is not None]
-        for parameter, gradient in zip(
-            taught, held["gradients"]
-        ):  # a step in single operations has its own
+        # A step in single operations has its own.
+        for parameter, gradient in zip(taught, held["gradients"]):
             parameter.grad = gradient
         on_gpu = self.device.type == "cuda"
         for group in self.optimiser.param_groups:

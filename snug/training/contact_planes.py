@@ -145,9 +145,8 @@ class NearestVertices:
         from scipy.spatial import cKDTree
 
         _, *posed = self.bodies.posed(batch)
-        garments = np.nan_to_num(
-            x.detach().flatten(0, 1).cpu().numpy()
-        )  # what is no number, the loss says
+        # What is no number, the loss says.
+        garments = np.nan_to_num(x.detach().flatten(0, 1).cpu().numpy())
         nearest = [
             cKDTree(body, balanced_tree=False, compact_nodes=False).query(garment)[1]
             for body, garment in zip(posed[0].cpu().numpy(), garments)
