@@ -100,7 +100,7 @@ def excess_by_time_step(run: Run) -> list[Table]:
     for garment, method, excess in _excesses(run):
         against = excess.effect.against
         moved = [
-            off_scale(excess.effect.value + against[name], EXCESS) if name in against else None
+            float(off_scale(excess.effect.value + against[name], EXCESS)) if name in against else None
             for name in members
         ]
         if against:
