@@ -120,7 +120,9 @@ def digest(value: Any) -> str:
 
 def _plain(value: Any) -> Any:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        return {f.name: getattr(value, f.name) for f in dataclasses.fields(value)}
+        known = {f: getattr(value, f.name) for f in dataclasses.fields(value)}
+        # An option added later changes no digest where it is not used.
+        return {f.name: v for f, v in known.items() if not (f.metadata.get("added") and v == f.default)}
     if hasattr(value, "tobytes"):  # an array
         return [str(value.dtype), list(value.shape), digest(value.tobytes())]
     if isinstance(value, set | frozenset):

@@ -20,12 +20,13 @@ from snug.named_recipes import (
     SUPERVISED,
     TAILORNET,
 )
-from snug.recipe import DEFAULT, Recipe
+from snug.recipe import DEFAULT, Recipe, RecipeError
 
 if TYPE_CHECKING:
     from snug.networks.garment_network import GarmentNetwork
 
-UNITS = {"energies": "J", "vertices": "cm²", "bands": "cm"}  # of a loss: a frame's energy, or a distance
+# Of a loss: a frame's energy, or a distance. Energies beside it are in joules before they are weighed.
+UNITS = {"energies": "J", "vertices": "cm²", "bands": "cm"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -73,6 +74,18 @@ class Kind:
     def unit(self) -> str:
         """Unit of its loss."""
         return UNITS[self.targets]
+
+    def has_energies(self, recipe: Recipe) -> bool:
+        """Return whether a recipe has energies in the loss of this kind, alone or beside simulated vertices.
+
+        Raises RecipeError for a `physics_weight` where no steps are taken on simulated vertices.
+        """
+        if recipe.physics_weight and (self.targets != "vertices" or self.fitted):
+            raise RecipeError(
+                f"recipe option physics_weight={recipe.physics_weight}: {self.name} learns no simulated "
+                "vertices step by step; use 0"
+            )
+        return self.physics or recipe.physics_weight > 0
 
 
 def _handles(count: int, cost: float) -> Kind:

@@ -1,14 +1,15 @@
 """Recipe: every choice of a training run in one frozen place. The named ones are in snug.named_recipes.
 
-No recipe holds a balancing weight between the energies: there is none. `Recipe.terms` names any energy
-that `find_energy` knows. Imports nothing heavy, so that a command can list recipes without loading torch.
+No recipe holds a balancing weight between the energies: there is none. `physics_weight` alone weighs
+them, together, against a distance. `Recipe.terms` names any energy that `find_energy` knows. Imports
+nothing heavy, so that a command can list recipes without loading torch.
 """
 
 from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, fields
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any
 
 from reference_sim import energies
@@ -66,8 +67,12 @@ class Recipe:
             default.
         contact_margin: of ContactPenalty; None takes the simulator's default.
         mixed: frames of augmented motions (snug.training.augmentation) for each frame of a
-            training motion, up to 20,000; not for networks that learn simulated vertices.
+            training motion, up to 20,000; not for networks that learn simulated vertices, whose clips
+            are simulated beforehand.
         terms: energies in the loss, TERMS or any other that `find_energy` knows.
+        physics_weight: lambda [cm^2/J] of the loss of networks that learn simulated vertices: mean squared
+            distance [cm^2] + lambda * the sum of `terms` [J]. With 0 the distance alone; energies alone
+            have no such weight. Added later: 0 is in no digest, and what a file without it means.
         inertia_form: `equation_5` (the inertia of each frame with two before it in its window, through
             which its gradient reaches all three), `detached_past` (the same without a gradient to the two
             frames before, as in Neural Cloth Simulation and GAPS) or `two_transitions` (the published
@@ -107,6 +112,7 @@ class Recipe:
     contact_margin: float | None = None
     mixed: float = 12.0
     terms: tuple[str, ...] = TERMS
+    physics_weight: float = field(default=0.0, metadata={"added": True})
     inertia_form: str = "equation_5"
     material: str = "stvk"
     bending: str = "length_area"
@@ -139,7 +145,9 @@ class Recipe:
             raise RecipeError("recipe options window, batch, window_stride and even must be at least 1")
         if "inertia" in self.terms and self.window < 3:
             raise RecipeError("recipe option window: inertia needs two frames before its own, so >= 3")
-        for option in ("smoothing", "weight_decay", "h0_sigma", "shape_range", "shape_share", "mixed"):
+        for option in (
+            "smoothing", "weight_decay", "h0_sigma", "shape_range", "shape_share", "mixed", "physics_weight",
+        ):  # fmt: skip
             if not getattr(self, option) >= 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must not be negative")
         if self.shape_of == "clip" and self.shape_range and not self.mixed:
@@ -157,6 +165,7 @@ class Recipe:
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Recipe:
         """Make a recipe from `as_dict`. Raises RecipeError for an unknown or missing option."""
+        values = {f.name: f.default for f in fields(cls) if f.metadata.get("added")} | values
         if differing := sorted(values.keys() ^ {field.name for field in fields(cls)}):
             raise RecipeError(f"recipe option {differing[0]!r} is unknown or missing")
         return cls(**{**values, "terms": tuple(values["terms"])})

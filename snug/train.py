@@ -194,7 +194,7 @@ def print_summary(model: TrainedModel) -> None:
     terms = [f"{name} {value:.4g}" for name, value in model.history[-1].items()
              if name not in ("step", "seconds")]  # fmt: skip
     print(f"recipe {model.recipe.name}, {model.summary['training_frames']} frames")
-    print(f"last steps, {model.unit}, mean over frames: " + "  ".join(terms))
+    print(f"last steps, {model.unit} (energies J), mean over frames: " + "  ".join(terms))
     for window in model.summary["named_windows"][:5]:
         print("step {step}: {window} at {joules} {unit}, {action}".format(**window, unit=model.unit))
     if validation := model.summary.get("validation"):

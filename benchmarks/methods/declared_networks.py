@@ -11,13 +11,24 @@ from typing import Any
 
 from benchmarks.method import MethodEntry, Reporting, Simulated, Training
 from snug.kinds import KINDS
-from snug.named_recipes import ABLATIONS, PAPER, PAPER_ABLATIONS, PAPERS, PBNS_SPRINGS
+from snug.named_recipes import (
+    ABLATIONS,
+    PAPER,
+    PAPER_ABLATIONS,
+    PAPERS,
+    PBNS_SPRINGS,
+    SUPERVISED,
+    SUPERVISED_VERTICES,
+)
+from snug.recipe import DEFAULT
 
 TRAININGS = {
     **{
         name: Training(name, kind.recipe, None if kind.physics else Simulated())
         for name, kind in KINDS.items()
     },
+    "supervised": Training("supervised", SUPERVISED, Simulated(mixed=round(DEFAULT.mixed))),
+    "supervised-vertices": Training("supervised", SUPERVISED_VERTICES, Simulated()),
     "pbns-paper": Training("pbns", PAPER),
     "pbns-springs": Training("pbns", PBNS_SPRINGS),
     **{f"snug-{recipe.name}": Training("snug", recipe) for recipe in (*PAPERS, *ABLATIONS)},
@@ -63,7 +74,11 @@ NAMED = (
             "the SNUG network with a random last layer (SNUG itself starts as skinning)",
             role="baseline", timed=False),  # a frame of it costs what one of SNUG does
     network("snug", "", "recurrent network trained on the energies alone (Santesteban et al. 2022)"),
-    network("supervised", "", "the SNUG network trained on simulated vertices instead"),
+    network("supervised", "",
+            "the SNUG network trained on simulated vertices, strain and collision; augmented clips too"),
+    network("supervised-vertices", "Supervised by vertices",
+            "the SNUG network trained on simulated vertices of the original motions alone",
+            role="ablation", base="supervised", pairing_group="supervised"),
     network("pbns", "", "static pose-space deformation trained on the energies (Bertiche et al. 2021)"),
     network("pbns-springs", "PBNS, springs", "PBNS with its own mass-spring material instead of StVK"),
     network("pbns-paper", "PBNS, paper's text", "PBNS with StVK, trained as SNUG by the paper's text",
@@ -140,12 +155,14 @@ FLOORS = (
 
 POST_PROCESSED = tuple(
     replace(
-        network(name, "", ""), name=f"{name}+cleanup", label=f"{KINDS[name].label}, post-processed",
+        network(name, label, ""), name=f"{name}+cleanup", label=f"{label}, post-processed",
         description=f"{name}, then vertices within 2 mm of the skin pushed out; both are timed",
         options={"kind": name, "cleanup": True}, batched=False,
         reporting=Reporting(base=name, pairing_group=name),
     )
-    for name in ("snug", "supervised")
+    for name, label in (
+        ("snug", "SNUG"), ("supervised", "Supervised"), ("supervised-vertices", "Supervised by vertices")
+    )
 )  # fmt: skip
 
 DIRECT_OPTIMISATION = MethodEntry(
@@ -179,15 +196,17 @@ RECIPES = tuple(
 )  # fmt: skip
 
 
-def _equal_data(name: str, label: str, mixed: int, *, converged: bool = False) -> MethodEntry:
-    """Declare a network on equal data, with `mixed` augmented frames for each given one.
+def _equal_data(
+    name: str, label: str, trained: str, mixed: int, *, converged: bool = False
+) -> MethodEntry:
+    """Declare a network trained as `trained`, on equal data: `mixed` augmented frames for each given one.
 
     The last training motion is held out. With every seed a network that simulated vertices teach gets the
     same clips, simulated once; another mixes as many anew. Both have SNUG's number of steps or go on
     until the held-out motion gets no better. Not timed: its run time is that of the network of the usual
     data.
     """
-    usual = TRAININGS[name]
+    usual = TRAININGS[trained]
     recipe = replace(usual.recipe, name=f"{usual.recipe.name}-data-{mixed}")
     training = (
         replace(usual, recipe=recipe, simulated=Simulated(mixed=mixed))
@@ -203,15 +222,18 @@ def _equal_data(name: str, label: str, mixed: int, *, converged: bool = False) -
         training=replace(training, steps_of="snug", held_out=1, converged=converged),
         role="ablation", batched=False, timed=False,
         reporting=Reporting(
-            family=family, level=float(mixed), base=f"{name}-data-{mixed}" if converged else name,
+            family=family, level=float(mixed), base=f"{name}-data-{mixed}" if converged else trained,
             pairing_group=name,
         ),
     )  # fmt: skip
 
 
 EQUAL_DATA = tuple(
-    _equal_data(name, label, mixed, converged=converged)
-    for name, label in (("snug", "SNUG"), ("supervised", "Supervised"))
+    _equal_data(name, label, trained, mixed, converged=converged)
+    for name, label, trained in (
+        ("snug", "SNUG", "snug"),
+        ("supervised", "Supervised by vertices", "supervised-vertices"),
+    )
     for converged, numbers in ((False, (0, 1, 3, 12)), (True, (0, 12)))
     for mixed in numbers
 )

@@ -34,7 +34,9 @@ STATIC = without_inertia(DEFAULT)
 def energies_of(training: Training) -> Recipe | None:
     """Return the energies that a network is trained on, as a recipe that is the default in all else.
 
-    None where these have no minimum, and for a network that learns simulated vertices.
+    None where these have no minimum, and for a network that learns simulated vertices: energies beside
+    these do not make the minimum of its loss, which is zero distance on its training motions and unknown on
+    others.
     """
     recipe, kind = training.recipe, KINDS[training.kind]
     if not (kind.physics and set(recipe.terms) >= NEEDED):

@@ -19,7 +19,8 @@ from benchmarks.runner.schedule import Schedule
 from reference_sim.trajectory import Trajectory
 from snug.training.simulated_data import write_data_set
 
-LEARNER = "supervised"  # the network that learns from the training motions, simulated to convergence
+# The network that learns from the training motions alone, simulated to convergence.
+LEARNER = "supervised-vertices"
 
 
 def plan_training_motions(garment: str, options: argparse.Namespace) -> Plan:

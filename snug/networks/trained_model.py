@@ -36,7 +36,8 @@ class TrainedModel:
         steps: number of updates.
         seconds: wall time of the steps, contact search included [s].
         setup_seconds: wall time of preprocessing: motions and first contact anchors [s].
-        history: one dict for every few steps: step, seconds, loss and each term [unit, mean over frames].
+        history: one dict for every few steps: step, seconds, loss and each term [mean over frames:
+            distances in `unit`, energies in J, before Recipe.physics_weight].
         summary: numbers and names of high windows, of updates left out, of returns to good weights.
         unit: of the loss: joules, or a distance from the simulated vertices.
         fps: frame rate of the training motions [1/s]; 0 where it is not known.
@@ -105,7 +106,7 @@ class TrainedModel:
         Traceback (most recent call last):
         ...
         snug.networks.trained_model.ModelFileError: tshirt-snug: neither a model file nor a network of the \
-package: pbns-tshirt, snug-tshirt, supervised-tshirt
+package: pbns-tshirt, snug-tshirt, supervised-vertices-tshirt
         """
         path = _find_file(path)
         try:

@@ -35,6 +35,7 @@ class CapturedTrainer(Trainer):
         super().__init__(*arguments, **options)
         self.capturable = bool(
             self.loss
+            and not self.targets
             and not (self.kernels or self.nearest or self.network.lead)
             and self.data.shapes is None
         )

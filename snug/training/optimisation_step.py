@@ -100,25 +100,27 @@ class Trainer:
         self.contact: TrainingContact | None = None
         self.nearest: NearestVertices | None = None  # in place of anchors
         self.targets: VertexTargets | None = None
-        if how.physics:
+        if how.has_energies(recipe):
             self.loss = PhysicsLoss(
                 dressed.cloth, recipe, dt=self.data.dt, device=device, kernels=self.kernels
             )
             if recipe.contact_samples == "nearest_vertices":
                 self.nearest = NearestVertices(self.data)
             self.contact = self.contact_of(self.data)
-        else:
+        if not how.physics:
             self.targets = TARGETS[how.targets](self.data, motions, trajectories, self.weights)
         if self.contact:
             self.contact.search_first(self.weights)
+        # Of energies beside simulated vertices in the loss; all other terms have 1.
+        self.factors = dict.fromkeys(recipe.terms, recipe.physics_weight) if self.targets else {}
         self.hidden_states: HiddenStateCache | None = None
         start = self.network.random_state(1, 0.0, torch.Generator())
         # A state belongs to one body.
-        if self.loss and recipe.remembered and not self.shaped and start is not None:
+        if how.physics and recipe.remembered and not self.shaped and start is not None:
             states = start.shape[0], start.shape[-1]
             self.hidden_states = HiddenStateCache(self.data.first, states, device)
         self.guard = DivergenceGuard(
-            self.network, self.optimiser, spike=recipe.spike if self.loss else None
+            self.network, self.optimiser, spike=recipe.spike if how.physics else None
         )
 
     def contact_of(self, data: TrainingSet) -> TrainingContact | None:
@@ -141,7 +143,7 @@ class Trainer:
         return drawn
 
     def step(self, number: int) -> dict[str, float]:
-        """Take step `number`; return the loss and its terms, mean over frames, in the unit of the kind."""
+        """Take step `number`; return the loss in the unit of the kind and its terms, mean over frames."""
         self._set_rate(number)
         windows = self.draw()
         betas = None
@@ -150,7 +152,7 @@ class Trainer:
             betas = self.random.uniform(-1, 1, (len(windows), shapes)) * self.recipe.shape_range
         state = self.start_state(self.data.frames_of(windows))
         means = self.learn(number, windows, betas, state)
-        return {"loss": sum(means.values()), **means}
+        return {"loss": sum(self.factors.get(name, 1.0) * mean for name, mean in means.items()), **means}
 
     def learn(
         self, number: int, windows: np.ndarray, betas: np.ndarray | None, state: Tensor | None
@@ -165,6 +167,7 @@ class Trainer:
         offsets, after = self.network(batch.features, state)
         # Offsets first: the sum then lies in memory as they do.
         x = self.posed_by(offsets + batch.rest, self.weights, batch.transforms)
+        distances = self.targets.distances(x, batch) if self.targets else {}
         planes = posed = None
         if self.contact:
             posed = self.contact.bodies.posed(batch)
@@ -175,7 +178,7 @@ class Trainer:
         if self.contact and posed and self._searched_for_high(number, batch.frames, posed, x, terms):
             planes = self.contact.planes(batch, posed)
             terms = self.loss(x, batch.ahead, planes, behind=batch.behind)
-        means, trusted = self._update(number, windows, terms)
+        means, trusted = self._update(number, windows, distances | terms)
         if trusted and self.hidden_states and after is not None:
             self.hidden_states.keep(batch.frames[:, -1], after)
         if self.contact and posed:
@@ -233,15 +236,15 @@ class Trainer:
     def _update(
         self, number: int, windows: np.ndarray, terms: dict[str, Tensor]
     ) -> tuple[dict[str, float], bool]:
-        """Descend by the mean joules a frame, unless the guard leaves it out.
+        """Descend by the mean weighed loss a frame, unless the guard leaves it out.
 
         Returns the means by term, and whether the prediction is good enough to search contact anchors
         with.
         """
         stacked = torch.stack(list(terms.values()), 1)  # (N, terms, T)
-        whole = stacked.detach()
-        joules = whole.sum(1).mean(1).cpu().numpy()
-        means = dict(zip(terms, whole.mean((0, 2)).tolist()))
+        means = dict(zip(terms, stacked.detach().mean((0, 2)).tolist()))
+        stacked = stacked * stacked.new_tensor([[self.factors.get(name, 1.0)] for name in terms])
+        joules = stacked.detach().sum(1).mean(1).cpu().numpy()
         verdict = self.guard.judge(number, joules, self.namer(windows))
         if verdict == "leave out":
             return means, False

@@ -11,7 +11,9 @@ Two losses are distances from the simulated vertices:
     (VertexTargets) low, high: mean over vertices of |offset - simulated offset|_1 in each band      [cm]
     (BandTargets)
 
-The first trains the supervised baseline, SNUG's own network, and Santesteban 2019; the second TailorNet.
+The first trains the supervised baselines, SNUG's own network, and Santesteban 2019; the second TailorNet.
+Beside the first a recipe may have energies of the predicted vertices [J] (snug.training.physics_loss),
+weighed by Recipe.physics_weight [cm^2/J].
 """
 
 from __future__ import annotations
@@ -173,6 +175,10 @@ class VertexTargets:
         """Return parts of the loss of each window and frame, name -> (N, T). posed_by: skin, or its equal."""
         offsets, _ = network(batch.features, state)
         x = posed_by(offsets + batch.rest, self.weights, batch.transforms)
+        return self.distances(x, batch)
+
+    def distances(self, x: Tensor, batch: Batch) -> dict[str, Tensor]:
+        """Return the loss of predicted vertices x (N, T, V, 3) [m], name -> (N, T) [cm^2]."""
         return {"vertices": vertex_loss(x, self.vertices[torch.as_tensor(batch.frames)])}
 
 

@@ -77,14 +77,16 @@ class Validator:
             rows = np.arange(first, end).reshape(
                 (1, -1) if self.trainer.how.network.sequential else (-1, 1)
             )
-            total += float(torch.stack(list(self._terms(self.data.at(rows)).values())).sum())
+            terms = self._terms(self.data.at(rows))
+            weighed = [self.trainer.factors.get(name, 1.0) * term for name, term in terms.items()]
+            total += float(torch.stack(weighed).sum())
         return total / self.data.frames
 
     def _terms(self, batch: Batch) -> dict[str, Tensor]:
         trainer = self.trainer
-        if self.targets:
+        if trainer.loss is None:
+            assert self.targets is not None
             return self.targets.terms(trainer.network, batch, None)
-        assert trainer.loss is not None
         offsets, _ = trainer.network(batch.features, None)
         x = skin(batch.rest + offsets, trainer.weights, batch.transforms)
         planes = None
@@ -94,4 +96,5 @@ class Validator:
             planes = self.contact.planes(batch, posed)
         elif trainer.nearest:
             planes = trainer.nearest.planes(batch, x)
-        return trainer.loss(x, batch.ahead, planes, behind=batch.behind)
+        distances = self.targets.distances(x, batch) if self.targets else {}
+        return distances | trainer.loss(x, batch.ahead, planes, behind=batch.behind)

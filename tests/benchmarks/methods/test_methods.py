@@ -40,7 +40,7 @@ from tests.benchmarks.runner.tasks_by_hand import (
 SIZES = {"frames": 16, "settle_frames": 2, "sheet_cells": 4, "sheet_frames": 5, "gap_samples": 2}
 SIZES["least_seconds"] = 0.01
 TRAIN, TEST = "arm_raise", "kick"
-KINDS = ("untrained", "snug", "supervised", "pbns")
+KINDS = ("untrained", "snug", "supervised-vertices", "pbns")
 TINY = dataclasses.replace(
     find_preset("smoke"), **SIZES, repeats=1, steps=dict.fromkeys(("snug", "supervised", "pbns"), 2)
 )
@@ -59,8 +59,8 @@ BODY = f"tshirt/{TEST}"
 # Each solver is run in one scene at least, these in all of them.
 EVERYWHERE = ("simulation", "simulation-perturbed", "skinning", "newton")
 ON_A_BODY = (
-    "untrained", "snug", "supervised", "pbns", "lbfgs", "fast-lbfgs", "vbd", "xpbd", "skinning+lbfgs",
-    "snug+newton",
+    "untrained", "snug", "supervised-vertices", "pbns", "lbfgs", "fast-lbfgs", "vbd", "xpbd",
+    "skinning+lbfgs", "snug+newton",
 )  # fmt: skip
 NAMES = [*(scene.name for scene in SCENES), BODY]
 
@@ -176,7 +176,7 @@ def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(run, rows,
                 assert values["dynamics/amplitude"] == pytest.approx(1.0)
             if method == "skinning":
                 assert values["dynamics/amplitude"] == values["dynamics/quasi_static_difference"] == 0.0
-            assert not network or (values["cost/data"] > 0.0) == (method == "supervised")
+            assert not network or (values["cost/data"] > 0.0) == (method == "supervised-vertices")
         of = {r.method: r.value for r in rows if r.scene == name and r.metric == "gap/local"}
         assert of["simulation"] == pytest.approx(0.0, abs=1e-12)
         errors = [

@@ -36,14 +36,14 @@ def test_a_run_on_a_cluster_is_that_of_this_machine(tmp_path, monkeypatch):
     """Bit for bit, but for times: a network that learned from ground truth, and metrics of all frames."""
     monkeypatch.setattr(execution, "make_report", lambda log: "")
     options = ["smoke:garments", "--set", "split=validation"]
-    options += ["--scenes", "tshirt/sudden_stop", "--methods", "simulation,supervised"]
+    options += ["--scenes", "tshirt/sudden_stop", "--methods", "simulation,supervised-vertices"]
 
     def kept(name: str, *more: str) -> tuple[dict, dict]:
         """Run; return all numbers but costs, and the weights of the network."""
         folder = RunFolder(tmp_path / name)
         assert run.main([*options, "-o", str(folder.path), *more]) == 0
         rows = [row for row in folder.read_rows() if not row.metric.startswith("cost/")]
-        weights = read_tensors(folder.models / "supervised-seed0.safetensors")[0]
+        weights = read_tensors(folder.models / "supervised-vertices-seed0.safetensors")[0]
         return (
             {
                 (row.scene, row.method, row.metric): (row.value, row.uncertainty, row.status)

@@ -92,7 +92,7 @@ def test_a_failed_task_that_no_row_speaks_of_makes_the_exit_status_1(tmp_path, m
 
 WORN = "trajectories/tshirt-sudden_stop"
 DRESSED = ["smoke:garments", "--scenes", "tshirt/sudden_stop"]
-DRESSED += ["--methods", "simulation,skinning,supervised,snug"]
+DRESSED += ["--methods", "simulation,skinning,supervised-vertices,snug"]
 
 
 def run_dressed(folder: Path) -> dict:
@@ -120,7 +120,7 @@ def dressed(tmp_path_factory) -> tuple[Path, dict]:
         f"{WORN}/settled.npy", f"{WORN}/body.npy", f"{WORN}/body.vtkhdf",
         f"{WORN}/simulation.vtkhdf", f"{WORN}/quasi-static.vtkhdf", f"{WORN}/snug.npz",
         f"{WORN}/snug-quasi-static.vtkhdf", "trajectories/tshirt-07_01/simulation.vtkhdf",
-        "models/supervised-seed0.safetensors",
+        "models/supervised-vertices-seed0.safetensors",
     ],
 )  # fmt: skip
 def test_every_kind_of_kept_file_is_made_again_and_the_numbers_are_the_same(dressed, tmp_path, name):

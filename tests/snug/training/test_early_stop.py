@@ -7,7 +7,7 @@ import torch
 
 from reference_sim import Obstacle, Potential
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Inertia, Step, StretchStVK
-from snug.named_recipes import SUPERVISED
+from snug.named_recipes import SUPERVISED_VERTICES
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
 from snug.training.train_network import TrainingLoop
@@ -63,7 +63,8 @@ def test_supervised_validates_against_its_own_targets():
     target = tube_dress().skinned(HELD, smoothing=20)
     target[..., 1] += 0.02
     validation = Validation(motions=[HELD], every=5, trajectories={"held": target})
-    still = replace(SUPERVISED, learning_rate=1e-9)  # Adam takes whole steps along rounding errors too
+    # Adam takes whole steps along rounding errors too.
+    still = replace(SUPERVISED_VERTICES, learning_rate=1e-9)
     model = short("supervised", steps=5, recipe=still, trajectories=trajectories, validation=validation)
     # Taught to stay at skinning, where it starts, it is 2 cm off the held-out targets.
     assert model.summary["validation"]["best"] == pytest.approx(4.0, rel=1e-3)

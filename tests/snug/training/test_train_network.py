@@ -8,7 +8,7 @@ import torch
 from safetensors.torch import save_file
 
 from snug.motion.library import TRAIN
-from snug.named_recipes import PAPER
+from snug.named_recipes import PAPER, SUPERVISED
 from snug.networks import trained_model
 from snug.networks.trained_model import ModelFileError, TrainedModel
 from snug.recipe import DEFAULT
@@ -74,6 +74,8 @@ def test_files_that_are_no_models_are_named(tmp_path, monkeypatch):
         ({"kind": "supervised", "trajectories": None}, "needs trajectories"),
         ({"steps": 0}, "steps=0"),
         ({"motions": [swaying(30), swaying(30, fps=60.0)]}, "one frame rate"),
+        ({"recipe": SUPERVISED}, "physics_weight=.*: snug learns no simulated vertices"),
+        ({"kind": "nearest-poses", "recipe": SUPERVISED}, "nearest-poses learns no simulated vertices"),
         ({"kind": "gnn"}, r"'gnn'.*snug, pbns, supervised"),
     ],
 )
