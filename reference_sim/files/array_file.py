@@ -10,6 +10,7 @@ from __future__ import annotations
 import pickle
 from collections.abc import Collection
 from pathlib import Path
+from pickletools import genops
 from typing import Any
 
 import numpy as np
@@ -118,6 +119,10 @@ def read_pickled_arrays(path: str | Path, names: Collection[str]) -> dict[str, n
     arrays = {}
     try:
         with path.open("rb") as stream:
+            # The unpickler makes a table as long as the largest place that an object is put in.
+            if any(at > path.stat().st_size for op, at, _ in genops(stream) if op.name.endswith("PUT")):
+                raise ValueError("puts an object in a place beyond its end")
+            stream.seek(0)
             held = _Unpickler(stream, encoding="latin1").load()  # of text of Python 2
         if type(held) is not dict:
             raise ValueError("holds no dict of arrays")
