@@ -143,3 +143,11 @@ def test_a_hostile_or_broken_pickle_is_refused_in_one_line_and_nothing_is_run(tm
         read_pickled_arrays(path, ("a", "x"))
     message = str(caught.value)
     assert not marker.exists() and str(path) in message and "\n" not in message and len(message) < 500
+
+
+def test_a_pickle_that_asks_for_a_table_of_gigabytes_is_refused(tmp_path):
+    """CPython's unpickler would take 2.6 GB before it asks what a name stands for."""
+    path = tmp_path / "large.pkl"
+    path.write_bytes(b"\x80\x02}r" + (330_743_571).to_bytes(4, "little") + b".")
+    with pytest.raises(ArrayFileError, match="large.pkl: puts an object in a place beyond its end"):
+        read_pickled_arrays(path, ["a"])
