@@ -149,5 +149,5 @@ def test_a_pickle_that_asks_for_a_table_of_gigabytes_is_refused(tmp_path):
     """CPython's unpickler would take 2.6 GB before it asks what a name stands for."""
     path = tmp_path / "large.pkl"
     path.write_bytes(b"\x80\x02}r" + (330_743_571).to_bytes(4, "little") + b".")
-    with pytest.raises(ArrayFileError, match="large.pkl: puts an object in a place beyond its end"):
+    with pytest.raises(ArrayFileError, match="puts an object in a place beyond its end"):
         read_pickled_arrays(path, ["a"])
