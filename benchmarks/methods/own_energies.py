@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+from benchmarks.declarations import load
 from benchmarks.method import MethodEntry, Reporting, Training
 from benchmarks.methods.declared_networks import TRAININGS
 from snug.kinds import KINDS
@@ -52,6 +53,8 @@ def own_energies(entry: MethodEntry) -> Recipe | None:
     >>> own_energies(find_method("snug-paper")).contact_margin, own_energies(find_method("supervised"))
     (0.002, None)
     """
+    if entry.declared_in:
+        load(entry.declared_in)  # an energy of its own is then known by name
     if is_own_reference(entry):
         return replace(DEFAULT, **entry.options)
     training = entry.training or TRAININGS.get(entry.trained or "")
@@ -72,14 +75,15 @@ def own_reference(entry: MethodEntry) -> MethodEntry | None:
     energies = own_energies(entry)
     if energies in (None, DEFAULT, STATIC) or is_own_reference(entry):
         return None
-    recipes = (training.recipe for training in TRAININGS.values() if energies_of(training) == energies)
-    name = next((recipe.name for recipe in recipes), f"of-{entry.trained}")
+    known = [training.recipe.name for training in TRAININGS.values() if energies_of(training) == energies]
+    name = known[0] if known else f"of-{entry.trained}"
     static = "inertia" not in energies.terms
     return MethodEntry(
         name=f"simulation-{name}" + "-at-rest" * static,
         label=f"Simulation, {name.replace('-', ' ').replace('pbns', 'PBNS')}" + ", at rest" * static,
         description=f"{'quasi-static solutions' if static else 'the reference'} with the energies of {name}",
         module=MODULE,
+        declared_in="" if known else entry.declared_in,
         options={option: getattr(energies, option) for option in OPTIONS},
         needs_body=True,
         timed=False,

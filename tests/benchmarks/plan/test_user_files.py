@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 import sys
 from contextlib import contextmanager, redirect_stdout
+from copy import copy
 from io import StringIO
 from pathlib import Path
 
@@ -13,6 +14,7 @@ import pytest
 from benchmarks import run
 from benchmarks.method import MethodEntry, Training
 from benchmarks.methods.outside import program
+from benchmarks.methods.own_energies import own_energies, own_reference
 from benchmarks.plan import user_files
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
@@ -164,6 +166,20 @@ def test_an_energy_of_a_file_can_be_trained_on_once_it_is_loaded(tmp_path):
     (tmp_path / "levity.py").write_text(SCENE_FILE + "class Levity(Lift):\n    name = 'levity'\n")
     user_files.import_file(str(tmp_path / "levity.py"))
     assert dataclasses.replace(DEFAULT, terms=("strain", "levity")).terms[1] == "levity"
+
+
+def test_own_energies_of_a_users_file_are_known_where_the_file_was_not_loaded(tmp_path):
+    home = tmp_path / "draught.py"
+    home.write_text(SCENE_FILE + "class Draught(Lift):\n    name = 'draught'\n")
+    recipe = copy(DEFAULT)
+    object.__setattr__(recipe, "terms", (*DEFAULT.terms, "draught"))  # as it comes to a task's process
+    entry = MethodEntry(
+        name="mine", description="", trained="mine", training=Training("snug", recipe), role="network",
+        declared_in=str(home),
+    )  # fmt: skip
+    assert own_energies(entry).terms == recipe.terms
+    reference = own_reference(entry)
+    assert reference.declared_in == str(home) and own_energies(reference) == own_energies(entry)
 
 
 def test_a_method_brings_the_training_of_its_network(tmp_path):
