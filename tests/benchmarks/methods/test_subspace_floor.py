@@ -41,10 +41,8 @@ def unposed(scene, positions) -> np.ndarray:
     """Offsets (T, 3 V) that skinning with the recipe's weights takes to positions."""
     dressed, motion = DressedBody(scene.dressed.body, scene.dressed.garment), scene.dressed.motion
     local = torch.from_numpy(positions - dressed.pelvis(motion)[:, None])
-    weights, transforms = (
-        dressed.weights(DEFAULT.smoothing).double(),
-        dressed.transforms(motion.poses).double(),
-    )
+    weights = dressed.weights(DEFAULT.smoothing).double()
+    transforms = dressed.transforms(motion.poses).double()
     return (unskin(local, weights, transforms) - dressed.rest().double()).flatten(1).numpy()
 
 
@@ -62,10 +60,8 @@ def test_every_step_is_a_minimum_within_the_handles_and_above_that_of_all_vertic
     offsets = unposed(scene, floor.positions)
     assert left_over(columns, offsets) < 1e-8 and np.abs(offsets).max() > 0.01
     potential = Potential(copied_terms(scene))
-    dressed, weight = (
-        DressedBody(scene.dressed.body, scene.dressed.garment),
-        scene.cloth.masses.mean() * 9.81,
-    )
+    dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
+    weight = scene.cloth.masses.mean() * 9.81
     weights = dressed.weights(DEFAULT.smoothing).double().numpy()
     transforms = dressed.transforms(scene.dressed.motion.poses).double().numpy()
     for frame in range(1, FRAMES):
@@ -79,9 +75,8 @@ def test_every_step_is_a_minimum_within_the_handles_and_above_that_of_all_vertic
         turns = np.einsum("vj,jik->vik", weights, transforms[frame, ..., :3])
         forces = np.einsum("vij,vi->vj", turns, potential.gradient(x))
         sizes = np.linalg.norm(columns, axis=0)
-        assert np.abs(columns.T @ forces.ravel() / sizes).max() < 2e-6 * weight * np.sqrt(
-            columns.shape[1]
-        )
+        nothing = 2e-6 * weight * np.sqrt(columns.shape[1])
+        assert np.abs(columns.T @ forces.ravel() / sizes).max() < nothing
         assert np.abs(forces).max() > 0.1 * weight
 
 

@@ -50,9 +50,8 @@ def test_the_uncertainty_of_a_distance_is_what_another_right_simulation_changes(
 def test_the_family_has_two_starts_of_each_time_step():
     steps = {name: find_method(name).options.get("substeps", 1) for name in ("simulation", *FAMILY)}
     shifts = {name: find_method(name).options.get("shift", 0.0) for name in steps}
-    assert sorted((steps[n], shifts[n]) for n in steps) == [
-        (s, x) for s in (1, 2, 4, 8) for x in (0.0, 1e-4)
-    ]
+    pairs = [(count, shift) for count in (1, 2, 4, 8) for shift in (0.0, 1e-4)]
+    assert sorted((steps[name], shifts[name]) for name in steps) == pairs
     assert all(steps[one] == steps[two] == count for count, (one, two) in STARTS.items())
     assert noise({TWIN: 3.0}) == pytest.approx(3.0 / 2.0**0.5) and noise({SMALLER: 3.0}) is None
     assert trend({TWIN: 3.0, SMALLER: 1.0}) == {SMALLER: 1.0}

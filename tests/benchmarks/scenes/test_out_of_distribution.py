@@ -115,10 +115,8 @@ def test_another_material_judges_the_same_roll_out(roll_outs):
 
 
 def test_the_body_of_another_shape_is_seen_by_every_method(assets, models):
-    dressed, model = (
-        DressedBody(assets.body, assets.garments["tshirt"]),
-        TrainedModel.load(model_path(models, "snug", 0)),
-    )
+    dressed = DressedBody(assets.body, assets.garments["tshirt"])
+    model = TrainedModel.load(model_path(models, "snug", 0))
     for method in ("snug", "snug+cleanup", "skinning"):
         scene, made, x = rolled_out(assets, models, "out_of_distribution/girth_+5", method)
         betas = scene.dressed.betas
@@ -172,7 +170,5 @@ def test_the_task_of_the_settled_shirt_that_serves_all_comes_unasked():
     starts = {task.name: task for task in tasks_of(plan) if task.kind == "start"}
     ordinary, splits = "out_of_distribution-ordinary", "out_of_distribution-splits"
     assert list(starts) == [ordinary, splits, "out_of_distribution-girth_+5"]
-    assert (
-        starts[splits].needs == (("start", ordinary),)
-        and not starts["out_of_distribution-girth_+5"].needs
-    )
+    assert starts[splits].needs == (("start", ordinary),)
+    assert not starts["out_of_distribution-girth_+5"].needs

@@ -77,10 +77,7 @@ def test_the_option_makes_it_the_ground_truth_of_dressed_scenes(monkeypatch):
         self_contact=True,
     )
     plan = make_plan(study)
-    assert {scene.name: scene.self_contact for scene in plan.scenes} == {
-        "tshirt/kick": True,
-        "flag": False,
-    }
+    assert {s.name: s.self_contact for s in plan.scenes} == {"tshirt/kick": True, "flag": False}
     learned_from = of_garment("tshirt", plan.motions.worn).scene("walk")
     assert learned_from.self_contact
     of_kick, *_ = (cell for cell in plan.cells if cell.scene.dressed and cell.method == "simulation")
