@@ -2,8 +2,9 @@
 
 Vertices of a whole clip are optimised under the training loss, without a network,
 
-    min over x_1 ... x_T of  sum_t [strain + bending + gravity + collision](x_t) + sum_{t >= 3}
-    inertia(x_t) inertia(x_t) = sum_v m_v / (2 dt^2) |x_t - 2 x_{t-1} + x_{t-2}|^2
+    min over x_1 ... x_T of  sum_t [strain + bending + gravity + collision](x_t)
+                             + sum_{t >= 3} inertia(x_t),
+    inertia(x_t) = sum_v m_v / (2 dt^2) |x_t - 2 x_{t-1} + x_{t-2}|^2
 
 which a network could reach whose output were not bound to its input. All frames are one cloth of T
 copies, minimised by L-BFGS on the very terms that judge every method. Contact planes are frozen for a
@@ -13,8 +14,9 @@ lowest. Its time a frame is that of the whole clip divided by its frames.
 The floor of a subspace is the simulation, from its own past and with its own contact planes, whose cloth
 can only do what the subspace expresses: handles, or all that the last layer of a network can give,
 
-    x_v(q) = M_v (r_v + m_v + sum_k U_vk q_k)       M: skinning, r: the unposed garment, m + U q: its
-    offsets
+    x_v(q) = M_v (r_v + m_v + sum_k U_vk q_k)
+
+with skinning M, the unposed garment r and its offsets m + U q.
 
 So the excess of a network over the reference splits into the floor's, which no training removes, and the
 rest, which its training has not learned; that may be negative where cloth is chaotic.

@@ -8,9 +8,9 @@ found from x_t, the one that lies below the frame. Over the judged frames
 
     gap        mean of Phi(x_t) - Phi* [J]
     local      mean of Phi(x_t) - Phi(y_t) [J]
-    relative   gap / scale,  scale = mean of Phi(x_s) - Phi(x_r) over steps of the reference simulation
-    x_r refrozen   the local gap where planes are frozen at x_t instead: what depends on where they are
-    frozen distance   mean of the root mean square distance of vertices between x_t and y_t [mm]
+    relative   gap / scale,  scale = mean of Phi(x_s) - Phi(x_r) over steps of the reference x_r
+    refrozen   the local gap where planes are frozen at x_t: what depends on where they are frozen
+    distance   mean of the root mean square distance of vertices between x_t and y_t [mm]
     curvature  mean of |H(x_t) - H(y_t)| by the areas of y_t [1/m]
     norm       mean of the largest component of grad Phi(x_t), in mean vertex weights
 

@@ -3,9 +3,8 @@
 With d the distance from a vertex to the nearest point of the other surface, and theta the angle between
 the normals there, both weighted by a third of the triangles around the vertex,
 
-    Chamfer distance   (mean of d from A to B + mean of d from B to A) / 2                        [mm]
-    angle of normals   the same of theta
-    [degrees]
+    Chamfer distance   (mean of d from A to B + mean of d from B to A) / 2    [mm]
+    angle of normals   the same of theta                                      [degrees]
 
 (Cignoni, Rocchini and Scopigno 1998). They are blind to cloth that slides along itself. What moves on
 another mesh than the scene's has these numbers and its penetration alone.

@@ -1,7 +1,7 @@
 """Coulomb friction of contact samples on a moving body, smoothed and lagged so that it is an energy.
 
-    u = (I - n n^T) ((x_s - x_s^t) - (c - c^t))    slip over the step, relative to the skin under the
-    sample E = mu N f(|u|),   f(y) = y^2/h - y^3/(3 h^2) + h/3 for y < h, else y,   h = speed dt
+    u = (I - n n^T) ((x_s - x_s^t) - (c - c^t))    slip over the step, relative to the skin
+    E = mu N f(|u|),   f(y) = y^2/h - y^3/(3 h^2) + h/3 for y < h, else y,   h = speed dt
 
 (IPC's smoothing, Li et al. 2020.) `speed` [m/s] is the slip below which friction is still growing.
 

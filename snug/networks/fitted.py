@@ -1,12 +1,12 @@
 """Learners without training steps: the nearest training poses, and ridge regression on principal components.
 
-    nearest poses:  offsets(theta) = sum_k w_k offsets_k,  w_k ~ 1 / |r(theta) - r_k|^2, of the K nearest
-    r_k regression:     offsets(theta) = mean + D W (r(theta) - mean),  D: principal components of the
-    offsets
+    nearest poses:  offsets(theta) = sum_k w_k offsets_k,  w_k ~ 1 / |r(theta) - r_k|^2
+    regression:     offsets(theta) = mean + D W (r(theta) - mean)
 
-Both learn offsets of the unposed garment from simulated frames in one go; a network has to do better from
-the same frames. r are the numbers of a pose (DressedBody.features): for the first up in the root's axes
-and two columns of each joint's rotation as they are, so that |r - r_k| is a distance of rotations.
+over the K nearest r_k, and with principal components D of the offsets. Both learn offsets of the unposed
+garment from simulated frames in one go; a network has to do better from the same frames. r are the
+numbers of a pose (DressedBody.features): for the first up in the root's axes and two columns of each
+joint's rotation as they are, so that |r - r_k| is a distance of rotations.
 """
 
 from __future__ import annotations

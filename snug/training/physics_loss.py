@@ -19,8 +19,8 @@ point.
 The material of PBNS itself (Bertiche et al. 2021), springs, hinges, uniform mass, squared contact::
 
     edges    15 (l - l0)^2                  [J]  reference_sim's StretchSpring, exactly
-    bending  5e-5 |n0 - n1|^2               [J]  reference_sim's BendHinge, 5e-5 theta^2: the nearest
-    there is gravity  m g y, m = 0.3 kg/m^2 A / V    [J]  the same mass for every vertex
+    bending  5e-5 |n0 - n1|^2               [J]  reference_sim's BendHinge, 5e-5 theta^2, the nearest
+    gravity  m g y, m = 0.3 kg/m^2 A / V    [J]  the same mass for every vertex
     contact  25 max(4 mm - n.(x - c), 0)^2  [J]  on vertices, with the contact planes of all our training
 
 `|n0 - n1|^2 = 4 sin^2(theta/2) = theta^2 - theta^4/12 + ...`: the hinge has 3 % more at 0.6 rad, and goes

@@ -7,9 +7,8 @@ translations (T,3) [m] and vertices (T,V,3) [m] from the pelvis, float32.
 
 Two losses are distances from the simulated vertices:
 
-    vertices: mean over vertices of |x - x_simulated|^2                              [cm^2]
-    (VertexTargets) low, high: mean over vertices of |offset - simulated offset|_1 in each band      [cm]
-    (BandTargets)
+    VertexTargets  vertices: mean over vertices of |x - x_simulated|^2                        [cm^2]
+    BandTargets    low, high: mean over vertices of |offset - simulated offset|_1 in a band   [cm]
 
 The first trains the supervised baselines, SNUG's own network, and Santesteban 2019; the second TailorNet.
 Beside the first a recipe may have energies of the predicted vertices [J] (snug.training.physics_loss),

@@ -4,8 +4,8 @@ The test of Sano, Yamaguchi and Wada (2017, doi 10.1103/PhysRevLett.118.178001),
 2021 validate friction. A clamp holds the strip upright and is lowered by the strain e times its length L;
 its tip stands on the floor below. Without weight the elastica is
 
-    theta'' = -(N sin theta + T cos theta),   theta(0) = 0, theta'(1) = 0
-    (1) x = integral of sin theta = 0,            integral of cos theta = 1 - e
+    theta'' = -(N sin theta + T cos theta),   theta(0) = 0, theta'(1) = 0    (1)
+    x = integral of sin theta = 0,            integral of cos theta = 1 - e
 
 with theta from the downward vertical, s from the clamp over L, and N and T, the floor's force on the tip
 upwards and aside, over D / L^2. It sticks as long as |T| / N <= mu. Aside the stiffness of the tip is
