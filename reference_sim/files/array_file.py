@@ -121,7 +121,7 @@ def read_pickled_arrays(path: str | Path, names: Collection[str]) -> dict[str, n
         with path.open("rb") as stream:
             # The unpickler makes a table as long as the largest place that an object is put in.
             size = path.stat().st_size
-            if any(place > size for op, place, _ in genops(stream) if op.name.endswith("PUT")):
+            if any((at or 0) > size for op, at, _ in genops(stream) if op.name.endswith("PUT")):
                 raise ValueError("puts an object in a place beyond its end")
             stream.seek(0)
             held = _Unpickler(stream, encoding="latin1").load()  # of text of Python 2
