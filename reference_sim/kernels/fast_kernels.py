@@ -18,10 +18,8 @@ to the energies' gradients and Hessians.
 
 Training on a CPU evaluates one mesh in some fifty configurations, so each element is worked out for
 TRAINING_LANES of them at once, in float32: the innermost loop has a fixed length and no branch, and the
-compiler turns it into vector instructions. Vertices (N, T, V, 3) of N windows of T frames lie in memory
-as C blocks of TRAINING_LANES frames, (C, V, 3, TRAINING_LANES): the first frames of all windows, then the
-second ones, and so on (snug.kernels.skinning). tests/snug/training/test_device.py holds these kernels to
-the definitions.
+compiler turns it into vector instructions. Vertices lie in memory as (C, V, 3, TRAINING_LANES), see
+snug.kernels.skinning.
 """
 
 from __future__ import annotations

@@ -3,18 +3,15 @@
 Each iteration solves H p = -g and takes the full step. Where the Cholesky factorisation of H does not
 exist, a share of the elements' negative curvature is taken out, CONVEXITY at one projection level after
 another, and only when all of it was not enough (cloth without inertia) H is shifted by sigma M/dt^2.
-Taking all of it out always, as is common, needs several times the iterations once cloth wrinkles; shifts
-alone need a third more factorisations (measured on a T-shirt walking, running and jumping). The first
-iteration of a step of moving cloth nearly always needs all of it out: with start_projected=True it begins
-so, which helps few iterations.
+Taking all of it out always, as is common, needs several times the iterations once cloth wrinkles. With
+start_projected=True the first iteration begins so.
 
 The minimum of stiff cloth lies along a narrow, curved valley of the energy. A full step along it ends
 where stresses computed from the strain are false by orders of magnitude. So the Hessian takes the
 stresses that the step predicted (Magisano, Leonetti and Garcea 2017). Where a full step raises the
 energy, up to WATCHDOG_STEPS further ones go on from there (the watchdog of Chamberlain et al. 1982). Only
 a point below their start is kept; if none comes, they are taken back, and a line search along the true
-Newton direction takes over. Without this, sheets 1e4 times as stiff as cotton took more than 300
-iterations.
+Newton direction takes over.
 
 A factorisation costs ten times as much as solving with it and looking at the energy. So with reuse=True
 it serves as the first guess of L-BFGS after its own step, as long as that goes on well.

@@ -11,9 +11,8 @@ The inputs are of the joints near a garment:
     pose of a joint:    two columns of its rotation R, and the direction of gravity in its axes
     motion of a joint:  rates of both, and the acceleration of its position in its axes
 
-A body that stands still has a motion of zero. The pelvis differs from the authors' inputs: its rotation
-is left out of the pose, and the rate of it is taken in its own axes, so that it does not matter where
-north is.
+The pelvis differs from the authors' inputs: its rotation is left out of the pose, and the rate of it is
+taken in its own axes, so that it does not matter where north is.
 """
 
 from __future__ import annotations

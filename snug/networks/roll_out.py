@@ -43,8 +43,7 @@ def roll_out(
 ) -> Trajectory:
     """Compute the garment's positions in each frame of a motion.
 
-    The state starts at zero and is carried from frame to frame. Inputs and joint transforms are ready
-    before the first frame, so that the frames' times are those of network and skinning.
+    The state starts at zero and is carried from frame to frame.
 
     Args:
         model: a trained network.

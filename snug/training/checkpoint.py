@@ -22,8 +22,6 @@ CHECKPOINT_FORMAT = "snug-checkpoint-8"
 class Checkpoint:
     """File of a run's checkpoints, and how often one is written.
 
-    The file stays until `delete`: until the caller has written the finished model, it is all there is.
-
     Attributes:
         path: the file.
         minutes: after so many minutes; 0 for never.

@@ -208,8 +208,7 @@ def train_network(
         device: `cpu` or `cuda`, for the whole step.
         kernels: closed forms in numba (the default on a CPU) or the definitions of the energies in torch
             (everywhere else).
-        checkpoint: where checkpoints are written; the caller deletes the last one after storing the
-            model.
+        checkpoint: where checkpoints are written; the caller deletes it after storing the model.
         validation: held-out motions; the weights that do best on them are kept.
 
     Raises:
