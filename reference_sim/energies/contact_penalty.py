@@ -350,8 +350,7 @@ class ContactPenalty(Energy):
 def _samples(cloth: Cloth, kind: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return stencils (S, 3), weights (S, 3) and areas (S,) of the contact samples.
 
-    All stencils have three vertices so that one kernel serves them; a vertex sample repeats itself with
-    weight 0.
+    All stencils have three vertices; a vertex sample repeats itself with weight 0.
     """
     vertices = np.arange(cloth.vertex_count)
     stencils = [np.repeat(vertices[:, None], 3, axis=1)]

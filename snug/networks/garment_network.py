@@ -29,8 +29,7 @@ if TYPE_CHECKING:
 class GarmentNetwork(nn.Module):
     """A map from features (N, T, D) and a state to offsets (N, T, V, 3) [m] and the next state.
 
-    The features are normalised inside, by the mean and spread of the training frames, which are saved
-    with the weights: a caller passes plain features and cannot forget it.
+    The features are normalised inside, by the mean and spread of the training frames.
 
     Attributes:
         feature_set: inputs it reads, one of snug.networks.dressed_body.FEATURE_SETS.
@@ -176,9 +175,8 @@ def make_network(
 ) -> GarmentNetwork:
     """Make a network at its start; the same seed gives the same weights, whatever was drawn before.
 
-    It maps features (N, T, D = inputs) to offsets (N, T, V, 3) [m], none at the pins, which the body
-    carries.
-    Raises ValueError for an unknown kind.
+    Its features (N, T, D) have D = inputs, its offsets are none at the pins. Raises ValueError for an
+    unknown kind.
 
     Example:
         >>> from snug.recipe import DEFAULT

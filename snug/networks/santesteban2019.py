@@ -5,9 +5,8 @@
 
 It learns simulated vertices, as the supervised network does. Its authors train the
 two parts one after the other, the fit on drapes of many bodies in one pose; here both are trained
-together on the simulated motions. Those show one body shape, the mean one: the fit reads a constant and
-can only give a constant, a mean drape that the last layer's bias could hold as well. Its numbers say
-nothing of how it would do on other bodies. The authors' collision post-processing (2 mm) is no part of
+together on the simulated motions. Those show the mean body alone: the fit gives a constant, a mean drape,
+and its numbers say nothing of how it would do on other bodies. The authors' collision post-processing (2 mm) is no part of
 the network.
 """
 

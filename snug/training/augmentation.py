@@ -134,8 +134,7 @@ def hang_arms(motion: Motion, nearest: np.ndarray) -> Motion:
     """Turn each shoulder about the chest's front axis, by one angle in all frames.
 
     The angle is that which brings the smallest angle between upper arm and downward spine to `nearest`,
-    (2,) [rad], left and right, where the arm is square to that axis. Others end elsewhere: of 666 arms of
-    clips of seed 0, 6 % below 25 degrees.
+    (2,) [rad], left and right, where the arm is square to that axis; others end elsewhere.
     """
     poses = motion.poses.copy()
     outward = (nearest - arm_clearance(motion).min(axis=0)) * [1.0, -1.0]
