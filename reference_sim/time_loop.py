@@ -258,7 +258,7 @@ def simulate(
         energies: the terms of Phi. Inertia is added here; no other term is.
         dt: time between frames [s].
         frames: number of frames T in the result.
-        obstacle: the moving body, one mesh per frame; terms of contact read it.
+        obstacle: the moving body, one mesh per frame.
         start: (V, 3) [m] at frame 0; default the rest positions.
         velocity: (V, 3) [m/s] at frame 0; default zero.
         pin_positions: frame -> (P, 3) [m], for handles that move.

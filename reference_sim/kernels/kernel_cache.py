@@ -6,7 +6,7 @@ So each module's kernels are kept in a folder whose name holds a digest of the f
 with the same sources find the same folder.
 
 The folders lie in `__pycache__` beside the module, else in the user's cache folder, or in NUMBA_CACHE_DIR
-where that is set. No list of modules is kept: what counts for a kernel is what its module has imported.
+where that is set.
 
 A solver that serves any term gets the term's kernel when it runs. `kernel_argument` hands one over so
 that it is compiled in, as if it had been called by its name; the caller is compiled anew for each set of

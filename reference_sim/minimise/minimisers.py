@@ -57,8 +57,7 @@ def minimise(potential: Potential, x0: np.ndarray, method: str = "newton", **opt
     method: "newton" or "lbfgs". options: of its class, `Newton` or `LBFGS`: tolerance, max_iterations,
     timeout, ...
 
-    Failure is a status of the Result, not an exception. Raises ValueError for an unknown method, or a
-    tolerance that is no number above 0.
+    Raises ValueError for an unknown method, or a tolerance that is no number above 0.
 
     Example: a sheet of two triangles hangs from one side.
 

@@ -59,8 +59,7 @@ def roll_out(
     Raises:
         RollOutError: if the model does not fit the garment or the motion.
 
-    >>> trajectory = roll_out(TrainedModel.load("snug.safetensors"), dressed, motion)  # doctest: +SKIP
-    >>> trajectory.status  # doctest: +SKIP
+    >>> roll_out(TrainedModel.load("snug.safetensors"), dressed, motion).status  # doctest: +SKIP
     'ok'
     """
     if not quasi_static:

@@ -6,8 +6,8 @@
 It learns simulated vertices, as the supervised network does. Its authors train the
 two parts one after the other, the fit on drapes of many bodies in one pose; here both are trained
 together on the simulated motions. Those show the mean body alone: the fit gives a constant, a mean drape,
-and its numbers say nothing of how it would do on other bodies. The authors' collision post-processing (2 mm) is no part of
-the network.
+and its numbers say nothing of how it would do on other bodies. The authors' collision post-processing
+(2 mm) is no part of the network.
 """
 
 from __future__ import annotations
