@@ -287,10 +287,8 @@ def check_derivatives(energy: Energy, scene: BuiltScene) -> None:
         ahead, behind = (
             energy.value_and_gradient(x + sign * DIFFERENCE_STEP * direction) for sign in (1.0, -1.0)
         )
-        slope, stated = (
-            (ahead[0] - behind[0]) / (2.0 * DIFFERENCE_STEP),
-            float((gradient * direction).sum()),
-        )
+        slope = (ahead[0] - behind[0]) / (2.0 * DIFFERENCE_STEP)
+        stated = float((gradient * direction).sum())
         near = (
             DERIVATIVE_TOLERANCE * np.linalg.norm(gradient) + SUM_ROUND_OFF * abs(value) / DIFFERENCE_STEP
         )

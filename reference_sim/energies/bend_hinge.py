@@ -157,10 +157,8 @@ def _gradient(x, hinges, stiffness, rest, gradient):
             u[12 * L + n] = 0.5 * s * theta
             # d theta / d x_a = w_a n/|n|^2 of each face, w as in _hessian.
             a, b = s / (ax * ax + ay * ay + az * az), s / (bx * bx + by * by + bz * bz)
-            foot_a, foot_b = (
-                (ex * rx + ey * ry + ez * rz) / length,
-                (ex * sx + ey * sy + ez * sz) / length,
-            )
+            foot_a = (ex * rx + ey * ry + ez * rz) / length
+            foot_b = (ex * sx + ey * sy + ez * sz) / length
             a0, b0, a1, b1 = (length - foot_a) * a, (length - foot_b) * b, foot_a * a, foot_b * b
             a2, b2 = -length * a, -length * b
             u[n], u[L + n], u[2 * L + n] = a0 * ax + b0 * bx, a0 * ay + b0 * by, a0 * az + b0 * bz

@@ -143,16 +143,12 @@ def hinge_gradient(data, u, gradient, s):
         energy = np.float32(0.0)
         for g in range(L):
             ex, ey, ez = s[g] + e[g], s[L + g] + e[L + g], s[2 * L + g] + e[2 * L + g]
-            px, py, pz = (
-                s[3 * L + g] + e[3 * L + g],
-                s[4 * L + g] + e[4 * L + g],
-                s[5 * L + g] + e[5 * L + g],
-            )
-            qx, qy, qz = (
-                s[6 * L + g] + e[6 * L + g],
-                s[7 * L + g] + e[7 * L + g],
-                s[8 * L + g] + e[8 * L + g],
-            )
+            px = s[3 * L + g] + e[3 * L + g]
+            py = s[4 * L + g] + e[4 * L + g]
+            pz = s[5 * L + g] + e[5 * L + g]
+            qx = s[6 * L + g] + e[6 * L + g]
+            qy = s[7 * L + g] + e[7 * L + g]
+            qz = s[8 * L + g] + e[8 * L + g]
             length2 = ex * ex + ey * ey + ez * ez + TINY
             inverse = ONE / np.sqrt(length2)
             length = length2 * inverse

@@ -205,11 +205,9 @@ def _linear_stress(x, step, faces, Dm_inverse, lam, mu, stress):
             G11 += fb[i] * db[i]
             G01 += 0.5 * (fa[i] * db[i] + fb[i] * da[i])
         trace = lam * (G00 + G11)
-        stress[f, 0], stress[f, 1], stress[f, 2] = (
-            trace + 2 * mu * G00,
-            trace + 2 * mu * G11,
-            2 * mu * G01,
-        )
+        stress[f, 0] = trace + 2 * mu * G00
+        stress[f, 1] = trace + 2 * mu * G11
+        stress[f, 2] = 2 * mu * G01
 
 
 @njit(cache=True, error_model="numpy")

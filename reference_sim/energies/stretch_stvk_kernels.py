@@ -70,11 +70,9 @@ def membrane_gradient(data, u, gradient, s):
         energy = np.float32(0.0)
         for g in range(L):
             x1, y1, z1 = s[g] + e[g], s[L + g] + e[L + g], s[2 * L + g] + e[2 * L + g]
-            x2, y2, z2 = (
-                s[3 * L + g] + e[3 * L + g],
-                s[4 * L + g] + e[4 * L + g],
-                s[5 * L + g] + e[5 * L + g],
-            )
+            x2 = s[3 * L + g] + e[3 * L + g]
+            y2 = s[4 * L + g] + e[4 * L + g]
+            z2 = s[5 * L + g] + e[5 * L + g]
             d00, d01, d10, d11 = c[g], c[L + g], c[2 * L + g], c[3 * L + g]
             area = c[4 * L + g]
             ax, ay, az = x1 * d00 + x2 * d10, y1 * d00 + y2 * d10, z1 * d00 + z2 * d10
@@ -141,11 +139,9 @@ def _strain(x, faces, Dm_inverse, areas, lam, mu, values, gradients):
                 square = G00 * G00 + G11 * G11 + G01 * G01 + G01 * G01
                 energy[n] = area * (HALF * lam * trace * trace + mu * square)
                 m = mu + mu
-                S00, S11, S01 = (
-                    area * (lam * trace + m * G00),
-                    area * (lam * trace + m * G11),
-                    area * m * G01,
-                )
+                S00 = area * (lam * trace + m * G00)
+                S11 = area * (lam * trace + m * G11)
+                S01 = area * m * G01
                 # Columns of P = A F S, then the forces on the second and third corner.
                 ux, uy, uz = px * S00 + qx * S01, py * S00 + qy * S01, pz * S00 + qz * S01
                 vx, vy, vz = px * S01 + qx * S11, py * S01 + qy * S11, pz * S01 + qz * S11

@@ -70,10 +70,8 @@ def search(points, samples, everywhere, exact, mesh, pose, faces, barycentric, c
         set_boxes(everywhere.leaves, mesh, pose)
         fit_leaf(0, mesh, pose)  # whoever asks for NaN gets its first face
         faces[missed[:count]] = mesh.order[0]
-        barycentric[missed[:count]], closest[missed[:count]] = (
-            1.0 / 3.0,
-            mesh.corners[0].sum(axis=0) / 3.0,
-        )
+        barycentric[missed[:count]] = 1.0 / 3.0
+        closest[missed[:count]] = mesh.corners[0].sum(axis=0) / 3.0
         _search_groups(
             missed[:count].copy(),
             points,

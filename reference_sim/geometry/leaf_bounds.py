@@ -39,13 +39,8 @@ Pose = namedtuple("Pose", "number positions origin")
 @njit(cache=True, error_model="numpy")
 def set_boxes(leaves, mesh, pose):
     """Set the boxes of some leaves in a pose, and the greatest distance from the origin along an axis."""
-    spread, boxes, boxed, positions, origin = (
-        mesh.spread,
-        mesh.boxes,
-        mesh.boxed,
-        pose.positions,
-        pose.origin,
-    )
+    spread, boxes, boxed = mesh.spread, mesh.boxes, mesh.boxed
+    positions, origin = pose.positions, pose.origin
     largest = mesh.size[0]
     for leaf in leaves:
         if boxed[leaf] == pose.number:

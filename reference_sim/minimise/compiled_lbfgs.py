@@ -169,11 +169,9 @@ def descend(
         curvature = dot(p, gradient)
         if curvature > LEAST_CURVATURE * np.sqrt(dot(p, p) * dot(gradient, gradient)):
             newest, held = (newest + 1) % most, min(held + 1, most)
-            memory.S[newest], memory.Y[newest], memory.rho[newest] = (
-                p,
-                gradient,
-                np.float32(1.0) / curvature,
-            )
+            memory.S[newest] = p
+            memory.Y[newest] = gradient
+            memory.rho[newest] = np.float32(1.0) / curvature
         u[:] = trial
         gradient[:] = trial_gradient
         energies[:] = trial_energies

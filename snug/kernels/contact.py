@@ -60,11 +60,9 @@ def walk_to_foot(
         s0, s1, s2 = skin[j, 0] - o0, skin[j, 1] - o1, skin[j, 2] - o2
         t0, t1, t2 = skin[k, 0] - o0, skin[k, 1] - o1, skin[k, 2] - o2
         r0, r1, r2 = x0 - o0, x1 - o1, x2 - o2
-        ss, tt, st = (
-            s0 * s0 + s1 * s1 + s2 * s2,
-            t0 * t0 + t1 * t1 + t2 * t2,
-            s0 * t0 + s1 * t1 + s2 * t2,
-        )
+        ss = s0 * s0 + s1 * s1 + s2 * s2
+        tt = t0 * t0 + t1 * t1 + t2 * t2
+        st = s0 * t0 + s1 * t1 + s2 * t2
         sr, tr = s0 * r0 + s1 * r1 + s2 * r2, t0 * r0 + t1 * r1 + t2 * r2
         determinant = ss * tt - st * st
         v, w = (tt * sr - st * tr) / determinant, (ss * tr - st * sr) / determinant
@@ -75,11 +73,9 @@ def walk_to_foot(
         other = adjacency[face, side]
         if other < 0 or np.uint32(other) == last:
             break
-        d0, d1, d2 = (
-            centroids[other, 0] - homes[sample, 0],
-            centroids[other, 1] - homes[sample, 1],
-            centroids[other, 2] - homes[sample, 2],
-        )
+        d0 = centroids[other, 0] - homes[sample, 0]
+        d1 = centroids[other, 1] - homes[sample, 1]
+        d2 = centroids[other, 2] - homes[sample, 2]
         if d0 * d0 + d1 * d1 + d2 * d2 > reach:
             break
         last, face = face, np.uint32(other)
@@ -126,11 +122,9 @@ def byte_normals(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
             for n in range(L):
                 x, y, z = u[n], u[L + n], u[2 * L + n]
                 factor = np.float32(127.0) / (np.sqrt(x * x + y * y + z * z) + np.float32(1e-30))
-                u[n], u[L + n], u[2 * L + n] = (
-                    np.rint(factor * x),
-                    np.rint(factor * y),
-                    np.rint(factor * z),
-                )
+                u[n] = np.rint(factor * x)
+                u[L + n] = np.rint(factor * y)
+                u[2 * L + n] = np.rint(factor * z)
             for n in range(3 * L):
                 rounded[n] = u[n]
             for n in range(present):

@@ -268,10 +268,8 @@ class TrainingContact:
         """
         first = self.data.first
         motion = int(self.data.motion_of(frame))
-        start, stop = (
-            max(frame - reach, int(first[motion])),
-            min(frame + reach + 1, int(first[motion + 1])),
-        )
+        start = max(frame - reach, int(first[motion]))
+        stop = min(frame + reach + 1, int(first[motion + 1]))
         marks = self.bodies.marks
         moved = np.linalg.norm(marks[start:stop] - marks[frame], axis=2).max(axis=1)
         far = (start + np.flatnonzero(moved > near)).tolist()
