@@ -155,14 +155,13 @@ FLOORS = (
 
 POST_PROCESSED = tuple(
     replace(
-        network(name, label, ""), name=f"{name}+cleanup", label=f"{label}, post-processed",
-        description=f"{name}, then vertices within 2 mm of the skin pushed out; both are timed",
-        options={"kind": name, "cleanup": True}, batched=False,
-        reporting=Reporting(base=name, pairing_group=name),
+        entry, name=f"{entry.name}+cleanup", label=f"{entry.label}, post-processed", batched=False,
+        description=f"{entry.name}, then vertices within 2 mm of the skin pushed out; both are timed",
+        options={"kind": entry.name, "cleanup": True},
+        reporting=Reporting(base=entry.name, pairing_group=entry.reporting.pairing_group),
     )
-    for name, label in (
-        ("snug", "SNUG"), ("supervised", "Supervised"), ("supervised-vertices", "Supervised by vertices")
-    )
+    for entry in NAMED
+    if entry.name in ("snug", "supervised", "supervised-vertices")
 )  # fmt: skip
 
 DIRECT_OPTIMISATION = MethodEntry(

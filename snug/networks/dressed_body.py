@@ -6,6 +6,8 @@ where float32 keeps its digits and the energy of gravity is zero. The pelvis is 
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import torch
 from torch import Tensor
@@ -35,7 +37,6 @@ class DressedBody:
         self.vertices = len(garment.rest_positions)
         self.parents = [int(parent) for parent in body.parents]
         self._weights: dict[int, Tensor] = {}
-        self._rest_directions: Tensor | None = None
 
     def weights(self, smoothing: int) -> Tensor:
         """Return skinning weights (V, 24), borrowed from the body and averaged over neighbours.
@@ -62,18 +63,15 @@ class DressedBody:
         if betas is None:
             return mean
         shapes = torch.as_tensor(np.asarray(betas), dtype=torch.float32)
-        return mean + torch.einsum("...s,svi->...vi", shapes, self.rest_directions())
+        return mean + torch.einsum("...s,svi->...vi", shapes, self.rest_directions)
 
+    @cached_property
     def rest_directions(self) -> Tensor:
-        """Return the displacement of the unposed garment by one unit of each shape number, (10, V, 3) [m]."""
-        if self._rest_directions is None:
-            # The garment follows the body linearly, so one call for each direction tells all shapes.
-            units = np.eye(self.body.shape_count)
-            moved = [
-                self.garment.rest_for(self.body, unit) - self.garment.rest_positions for unit in units
-            ]
-            self._rest_directions = torch.as_tensor(np.stack(moved), dtype=torch.float32)
-        return self._rest_directions
+        """Displacement of the unposed garment by one unit of each shape number, (10, V, 3) [m]."""
+        # The garment follows the body linearly, so one call for each direction tells all shapes.
+        units = np.eye(self.body.shape_count)
+        moved = [self.garment.rest_for(self.body, unit) - self.garment.rest_positions for unit in units]
+        return torch.as_tensor(np.stack(moved), dtype=torch.float32)
 
     def pelvis(self, motion: Motion, betas: np.ndarray | None = None) -> np.ndarray:
         """Return the world position of the pelvis in each frame, (T, 3) [m] float64."""

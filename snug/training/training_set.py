@@ -184,7 +184,7 @@ class TrainingSet:
         """Return the batch with the unposed garments of shapes (N, S)."""
         shapes = betas.float()
         if self._rest_directions is None:
-            self._rest_directions = self.dressed.rest_directions().to(self.device)
+            self._rest_directions = self.dressed.rest_directions.to(self.device)
         rest = self.rest + torch.einsum("ns,svi->nvi", shapes, self._rest_directions)
         return replace(batch, rest=rest[:, None], betas=shapes)
 
