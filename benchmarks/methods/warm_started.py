@@ -118,16 +118,8 @@ class WarmStarted(Simulation):
         """Prepare frames and solver. Raises ValueError for several steps a frame: one alone has a start."""
         if scene.substeps > 1:
             raise ValueError(f"scene {scene.name} has {scene.substeps} steps a frame, starts are of one")
-        assert scene.dressed is not None
-        worn, dressed = scene.dressed, DressedBody(scene.dressed.body, scene.dressed.garment)
-        model = None if self.guess == SKINNING else TrainedModel.load(self.path)
-        motion, betas, carry = worn.motion, worn.betas, None
-        self.of_guess = prepare_frame_inputs(model, dressed, motion, betas, earlier=worn.before)
-        frames = prepare_frames(model, dressed, motion, betas, earlier=worn.before)
-        if self.residual:
-            transforms = dressed.transforms(motion.poses, betas)
-            carry = ResidualTransport(dressed.weights(DEFAULT.smoothing), transforms)
-        self.options = {"guess": given_frames(frames, carry), **self.solver}
+        guess = given_frames(self._frames(scene), self._carry(scene) if self.residual else None)
+        self.options = {"guess": guess, **self.solver}
         super().prepare(scene)
 
     def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
@@ -135,6 +127,21 @@ class WarmStarted(Simulation):
         assert scene.dressed is not None
         body = posed_body(scene.dressed)
         return lambda frame: (self.of_guess(frame), body(frame))
+
+    def _frames(self, scene: BuiltScene) -> Callable[[], Iterator[np.ndarray]]:
+        """Return a function that yields world positions (V, 3) [m], frame after frame, at each call."""
+        assert scene.dressed is not None
+        motion, betas, before = scene.dressed.motion, scene.dressed.betas, scene.dressed.before
+        dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
+        model = None if self.guess == SKINNING else TrainedModel.load(self.path)
+        self.of_guess = prepare_frame_inputs(model, dressed, motion, betas, earlier=before)
+        return prepare_frames(model, dressed, motion, betas, earlier=before)
+
+    def _carry(self, scene: BuiltScene) -> ResidualTransport:
+        assert scene.dressed is not None
+        dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
+        transforms = dressed.transforms(scene.dressed.motion.poses, scene.dressed.betas)
+        return ResidualTransport(dressed.weights(DEFAULT.smoothing), transforms)
 
 
 def make_warm_started(
