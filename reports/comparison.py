@@ -1,11 +1,8 @@
 """Comparison of two runs: changes beyond the noise of both, by garment and by scene, and what is gone.
 
-Changes of single scenes of a garment, which a mean over its motions hides.
-
 A network is tested in each scene over its seeds. Three seeds say little of their scatter, so the scatter
-is pooled over the scenes of the method, and a scene that scatters more has its own. A scene that scatters
-far more than most stays out of the pool: one motion on which seeds disagree would hide changes of all
-others. The test is Student's with the pooled degrees of freedom, corrected by Bonferroni for all of these
+is pooled over the scenes of the method. A scene that scatters more has its own; one that scatters far more
+stays out of the pool. The test is Student's with the pooled degrees of freedom, by Bonferroni for all these
 tests. A method without seeds is compared with the noise of the reference.
 """
 

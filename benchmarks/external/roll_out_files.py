@@ -10,8 +10,7 @@
 
 What a file declares of its size is compared with the file before anything of that size is allocated.
 Nothing is executed. A roll-out that does not fit its scene, in unit, axes, order of vertices, frame rate
-or place, is refused with the remedy: in centimetres it would get numbers, and nobody would see that they
-mean nothing.
+or place, is refused with the remedy.
 """
 
 from __future__ import annotations

@@ -6,10 +6,8 @@ Vertices of a whole clip are optimised under the training loss, without a networ
                              + sum_{t >= 3} inertia(x_t),
     inertia(x_t) = sum_v m_v / (2 dt^2) |x_t - 2 x_{t-1} + x_{t-2}|^2
 
-which a network could reach whose output were not bound to its input. All frames are one cloth of T
-copies, minimised by L-BFGS on the very terms that judge every method. Contact planes are frozen for a
-round and then searched anew. The sum is not convex: a bound found from skinning, not proven to be the
-lowest. Its time a frame is that of the whole clip divided by its frames.
+which a network could reach whose output were not bound to its input. The sum is not convex: the bound is
+found from skinning, by L-BFGS in rounds of frozen contact planes, and not proven to be the lowest.
 
 The floor of a subspace is the simulation, from its own past and with its own contact planes, whose cloth
 can only do what the subspace expresses: handles, or all that the last layer of a network can give,
@@ -17,9 +15,7 @@ can only do what the subspace expresses: handles, or all that the last layer of 
     x_v(q) = M_v (r_v + m_v + sum_k U_vk q_k)
 
 with skinning M, the unposed garment r and its offsets m + U q.
-
-So the excess of a network over the reference splits into the floor's, which no training removes, and the
-rest, which its training has not learned; that may be negative where cloth is chaotic.
+No training removes the excess of this floor over the reference.
 """
 
 from __future__ import annotations

@@ -4,10 +4,8 @@ Collision post-processing pushes vertices below or within 2 mm of the skin out t
 
     x' = x + max(2 mm - n.(x - c), 0) n      c: closest body point that x may touch, n: the skin's normal
 
-The released SNUG models and Santesteban 2019 end with such a step, so numbers from them are
-post-processed. Here it is a method of its own, and its time is on that method's clock. One push for each
-vertex, none for edges and faces: where skin is hollow a vertex may end nearer, and a long edge may still
-cut the body.
+The released SNUG models and Santesteban 2019 end with such a step. Here it is a method of its own, and is
+timed. Only vertices are pushed, once each: where skin is hollow, or by a long edge, cloth may stay inside.
 """
 
 from __future__ import annotations

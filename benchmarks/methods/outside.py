@@ -1,8 +1,7 @@
 """Methods from outside: stored roll-outs, and programs with their own environment.
 
-A program reads an exported scene and writes a roll-out. Its start, its imports and its files are no work
-of the method, so the harness's clock says nothing of it. A time that it writes beside the positions is
-reported, and marked as declared.
+A program reads an exported scene and writes a roll-out. The harness does not time it; a time that it
+writes beside the positions is reported, and marked as declared.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Own energies of a method: those that its network was trained on, and the simulation that minimises them.
 
-A network is as well trained as it comes near to the minimum of its own loss. So beside the energies of
-the scene, which are the same for all methods, each is measured by its own ones, against the simulation
-that has exactly these: the recipe's material, hinges, contact constants and terms. A network of single
+Each network is measured by the energies of its own loss too, against the simulation that has exactly
+these: the recipe's material, hinges, contact constants and terms. A network of single
 frames, or one trained without inertia, has no dynamics in its loss: its minimum is the quasi-static
 solution of each frame. Contact planes are the scene's whatever the recipe takes: at nearest vertices they
 jump as cloth slides, and no simulation converges on them.

@@ -1,9 +1,7 @@
 """Variants of the reference: the energies of a recipe, perturbed start.
 
 All are measured, as every method, by the energies that the scene declares; with other energies they start
-where the scene's own does. Wrinkling cloth has several minima, and which one is reached hangs on the last
-digits: what runs from perturbed starts differ by is the uncertainty of whatever is compared with the
-reference.
+where the scene's own does.
 """
 
 from __future__ import annotations

@@ -1,13 +1,10 @@
 """Solvers that begin each step at the frame of a network or of skinning, then take a few iterations.
 
-The state is carried: x_hat comes from the method's own two previous frames, so that inertia acts, while
-the network sees what it always sees. Contact planes are frozen at the first guess, as for every solver.
-The time of the network or of skinning is that of run(); posed body, features and joint transforms are
-ready before.
+The state is carried: x_hat comes from the method's own two previous frames, so that inertia acts. The time
+of the network or of skinning is that of run(); posed body, features and joint transforms are ready before.
 
-A network's error changes slowly: cloth that it puts too deep, or hangs too stiffly, is so in the next
-frame too. So the first guess may be the network's frame and a share of what the solver added to the last
-one, turned as skinning turns the vertex.
+A network's error changes slowly. So the first guess may be the network's frame and a share of what the
+solver added to the last one, turned as skinning turns the vertex.
 """
 
 from __future__ import annotations

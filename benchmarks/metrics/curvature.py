@@ -18,7 +18,7 @@ punishes a wrinkle in another place twice: a simulation from another start has a
 Whether wrinkles stay the same while the body moves ("the same despite the significant change in body
 pose", the paper says of PBNS) is told by
     sum_ti A_i | H_ti - median_t H_ti | / sum_ti A_i | H_ti - mean H |      with A_i the mean over frames,
-however deep the wrinkles are. It does not tell why they change: a flicker counts as well.
+however deep the wrinkles are.
 """
 
 from __future__ import annotations

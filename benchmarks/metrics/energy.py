@@ -5,8 +5,8 @@ trajectory, and contact planes are searched at the method's own positions. A fra
 two before it; it counts as moving freely, hence inertia 0 there. Means are over the frames after the
 warm-up.
 
-`energy/bending_printed` is of the same hinges as the SNUG paper prints them, not scaled: papers of the
-field give one or the other under the same name. It is no part of the total.
+`energy/bending_printed` is of the same hinges, not scaled, as the SNUG paper prints them. It is no part of
+the total.
 """
 
 from __future__ import annotations

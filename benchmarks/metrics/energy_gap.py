@@ -15,9 +15,8 @@ found from x_t, the one that lies below the frame. Over the judged frames
     norm       mean of the largest component of grad Phi(x_t), in mean vertex weights
 
 x_s is the garment skinned to the frame's pose or, where there is no body, the guess x_0. The scale is the
-same for every method of a scene. Each method is judged from its own history, which a chaotic roll-out
-cannot blur: a small gap says that a step was solved, not that the past was right; it does not measure
-dynamics.
+same for every method of a scene. Each method is judged from its own history: a small gap says that a step
+was solved, not that the past was right.
 """
 
 from __future__ import annotations

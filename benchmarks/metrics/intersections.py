@@ -1,7 +1,7 @@
 """Metrics intersections/*: a cloth through itself, in a frame and between two frames.
 
-A layer may go through another between two frames without intersections. On the straight way of every
-vertex from one frame to the next a vertex meets a triangle, or an edge an edge, where the four points are
+On the straight way of every vertex from one frame to the next a vertex meets a triangle, or an edge an
+edge, where the four points are
 in one plane and their primitives touch (Provot 1997). Broad phase and test are those of the package
 ipctk, by tight inclusion (Wang, Ferguson, Schneider, Jiang, Attene and Panozzo 2021).
 """

@@ -3,11 +3,9 @@
     100 (E(x) - E(y)) / (E(s) - E(y)) [%],    E the mean over the judged frames
 
 with x the method's roll-out, s the skinned garment, y the simulation that minimises E. Where E is the
-energy of the scene, by which all methods are compared, y is the reference and the number the relative
-excess. For a network that was trained on others (benchmarks.methods.own_energies) y is the simulation of
-these, started where the reference starts. The two answer two questions: how well a network was trained,
-and what its garment is worth beside others. Without inertia E is that of single frames, y the
-quasi-static solution.
+energy of the scene, y is the reference and the number the relative excess. For a network that was trained
+on others (benchmarks.methods.own_energies) y is the simulation of these, started where the reference
+starts. Without inertia E is that of single frames, y the quasi-static solution.
 """
 
 from __future__ import annotations

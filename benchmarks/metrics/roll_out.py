@@ -1,8 +1,7 @@
 """Metrics motion/* and roll_out/*: a method on what it was not made for, and on a motion that comes again.
 
-In motion/* a method is held against itself in the scene's counterpart, the ordinary walk. A network never
-hears of another material: its energy is by the one that it should have heard of. A network's shirt that
-has left the body has diverged; a simulated one has to be left behind by a body that jumps by a metre.
+In motion/* a method is held against itself in the scene's counterpart, the ordinary walk. A network's shirt
+that has left the body has diverged; a simulated one has to be left behind by a body that jumps by a metre.
 
 In roll_out/* one motion is seen early and much later. Energies are those of the cloth alone (strain,
 bending, inertia), which need no body; the first two frames of either stretch have no inertia and are left

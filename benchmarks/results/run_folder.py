@@ -139,9 +139,8 @@ def write_frame_energies(folder: RunFolder, rows: Iterable[Row]) -> None:
     """Write frame_energies.csv, whole or not at all: the energy of each evaluated frame by term.
 
     A line is a frame: scene, method, seed, seconds of the motion, then joules of each term and of their
-    sum. A term that a scene does not have is left empty. It holds what the paper draws over time, whole
-    motions in garments by reference, baselines and networks; without any there is no file. Curves of all
-    else lie beside their trajectories: they are too large to be published.
+    sum. A term that a scene does not have is left empty. It has whole motions in garments by reference,
+    baselines and networks; without any there is no file.
     """
     import pandas as pd
 

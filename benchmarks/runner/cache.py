@@ -2,9 +2,8 @@
 
 An entry names the inputs, code, packages and files that its outcome came of; where one of them is another
 now, the result is stale, and the task is done again.
-An entry is written whole after the files that it speaks of. A run that is killed therefore loses what it
-was at, and nothing else. It holds the digest of each of its files: what is not as it was written is
-missing, and done again.
+An entry is written whole after the files that it speaks of, and holds their digests: what is not as it was
+written is missing, and done again.
 """
 
 from __future__ import annotations

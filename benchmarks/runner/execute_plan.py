@@ -125,9 +125,8 @@ def make_report(log: RunLog) -> str | None:
 def held(folder: Path) -> Iterator[None]:
     """Hold a folder, made where it is not there. Raises RunRefused where another run, or a file, has it.
 
-    The lock lies on the folder itself and leaves no file. The system releases it with the process,
-    however that ended. Where the system or its file system has no such locks nothing is held, and that is
-    said.
+    The lock lies on the folder itself and leaves no file; it ends with the process. Where the file system
+    has no such locks nothing is held, and that is said.
     """
     try:
         folder.mkdir(parents=True, exist_ok=True)

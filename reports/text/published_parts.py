@@ -9,9 +9,9 @@ Between two comments, the first of which says from what:
 RUN is a folder of reports/published:
 
 front of RUN                                 the answer of README
-table NAME of RUN; COLUMN, ...; METHOD, ...  all where none is named; of `overview` METHODs of several
-runs claims primary of RUN, ...                   or exploratory: judged by the first run that has both
-methods counts of RUN, ...                           how many claims came out how
+table NAME of RUN; COLUMN, ...; METHOD, ...  all where none is named
+claims primary of RUN, ...                   or exploratory: by the first run that has both methods
+counts of RUN, ...                           how many claims came out how
 runs of RUN, ...                             day, commit and processor
 evaluations of published runs                how often they evaluated test motions
 

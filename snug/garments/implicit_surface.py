@@ -1,7 +1,6 @@
 """Implicit surface that a garment is cut from: a smooth solid around the body, as a signed field on a grid.
 
-A shirt that followed the skin would be pressed into the waist and between the legs, where cloth never
-goes. So the solid is a union of three solids, each grown by its own distance:
+The solid is a union of three, each grown by its own distance:
 
 - the body itself, by `clearance` (this shapes shoulders and neck);
 - the torso, one convex section per height, which below the armpits never narrows again on the way down:

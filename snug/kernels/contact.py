@@ -2,9 +2,8 @@
 
 An anchor moves as a bead on the skin would: to the foot of its sample on the anchor's face and, where the
 foot is outside, over a side that it is outside of onto the next face, until a foot is inside or a side or
-a corner is closest. Where the skin is one smooth sheet that is the closest point. What it cannot find is
-skin of another limb, a thigh that comes up through the hem: that takes a search
-(snug.training.contact_cache).
+a corner is closest. It cannot find skin of another limb, a thigh that comes up through the hem: that takes
+a search (snug.training.contact_cache).
 """
 
 from __future__ import annotations

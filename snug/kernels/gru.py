@@ -5,10 +5,9 @@ For each layer, with gates r, z, candidate n and q = W_hn h + b_hn (torch.nn.GRU
     r = s(W_ir x + b_ir + W_hr h + b_hr)     z = s(W_iz x + b_iz + W_hz h + b_hz)
     n = tanh(W_in x + b_in + r q)            h' = (1 - z) n + z h
 
-Three things make it faster than torch.nn.GRU under autograd: products of one sort are taken for all
-frames together, weight gradients above all; what stands between them is one kernel; and forward products
-go to oneDNN where torch has it, which on a CPU with AVX-512 that is not Intel's is twice as fast as MKL.
-The weights stay those of the modules.
+Products of one sort are taken for all frames together, weight gradients above all; what stands between
+them is one kernel; and forward products go to oneDNN where torch has it. The weights stay those of the
+modules.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Skinning of many frames of one garment in closed form, for training on a CPU, and their layout in memory.
 
-Few joints move a vertex, so each adds its share alone; blending the transforms of all joints takes ten
-times as long. The definition is `snug.body.skinning.skin`.
+Few joints move a vertex, so each adds its share alone. tests/snug/body/test_body.py compares values and
+gradients with `snug.body.skinning.skin`.
 
 The loops run over frames that lie side by side. Vertices (N, T, V, 3) of N windows of T frames lie in
 memory as C blocks of TRAINING_LANES frames, (C, V, 3, TRAINING_LANES): the first frames of all windows,

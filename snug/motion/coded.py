@@ -2,8 +2,7 @@
 
 Actions are tables of key angles (actions.toml, where the columns are explained), gaits follow published
 normative joint-angle curves. Twists and turning walks end within one frame, as no body can: they set a
-wide hem swinging and let it ring, so that the cloth moves by itself and its motion cannot be told from
-the pose.
+wide hem swinging and let it ring.
 """
 
 from __future__ import annotations
