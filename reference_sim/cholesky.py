@@ -1,12 +1,8 @@
 """Sparse Cholesky factorisations: by a package, and a compiled one to be called in the middle of a step.
 
-A package analyses once, factorises often and solves; not positive definite is an answer. It is CHOLMOD
-through cvxopt (GPLv3) with METIS nested dissection; where cvxopt is missing, SuperLU from scipy does the
-same job several times slower.
-
-The compiled one is LDL^T row by row (Davis 2005, "LDL: a concise sparse Cholesky factorization package"):
-row k of L solves a triangular system with the rows above it. It keeps up with a package to some 10,000
-rows.
+The package is CHOLMOD through cvxopt (GPLv3) with METIS nested dissection; where cvxopt is missing, SuperLU
+from scipy, several times slower. The compiled one is LDL^T row by row (Davis 2005, "LDL: a concise sparse
+Cholesky factorization package"): row k of L solves a triangular system with the rows above it.
 """
 
 from __future__ import annotations

@@ -5,12 +5,10 @@
 
 (IPC's smoothing, Li et al. 2020.) `speed` [m/s] is the slip below which friction is still growing.
 
-N [N] is the normal force of the collision penalty that ended the previous step, on that step's planes:
-the force that acted, so that friction is mu times what carried the cloth, also where the cloth slides
-past the end of a plane within a step. It comes a step late: a sample that meets the skin within a step
-has friction from the next one on. A first step (frame 1, or 0 of a potential without frames) has none
-before it: there N is that of the start, on the step's own planes moved back with the skin. In any other
-step without the one before, N is not known, and the energy is refused.
+N [N] is the normal force of the collision penalty that ended the previous step, on that step's planes. It
+comes a step late: a sample that meets the skin within a step has friction from the next one on. In a first
+step (frame 1, or 0 of a potential without frames) N is that of the start, on the step's own planes moved
+back with the skin. In any other step without the one before, the energy is refused.
 """
 
 from __future__ import annotations

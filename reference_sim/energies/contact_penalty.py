@@ -8,9 +8,8 @@ method does not survive them; so each sample gets one plane per step, taken at t
 frozen (`Obstacle.planes`), and this energy is the distance to that plane. The true signed distance is a
 metric.
 
-Samples sit on vertices, edge midpoints and face centroids, because a coarse mesh whose vertices are
-outside still cuts through a shoulder with its edges. a_s makes k a density: each of the three kinds of
-sample carries the whole area of the cloth once, so that a finer mesh does not get a stiffer contact.
+Samples sit on vertices, edge midpoints and face centroids. a_s makes k a density: each of the three kinds
+of sample carries the whole area of the cloth once, so that a finer mesh does not get a stiffer contact.
 """
 
 from __future__ import annotations

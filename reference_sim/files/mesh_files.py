@@ -3,9 +3,8 @@
 OBJ is read here, since meshio refuses the texture coordinates of a garment with seams; PLY, STL and OFF
 are read by meshio.
 
-Along a seam a vertex has one place in each piece of the pattern, so a chart is kept by the faces'
-corners. In space the pieces are one mesh: vertices that a program has doubled for the sake of its chart
-are joined.
+A chart is kept by the faces' corners. In space the pieces of the pattern are one mesh: vertices that a
+program has doubled for the sake of its chart are joined.
 """
 
 from __future__ import annotations

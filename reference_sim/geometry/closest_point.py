@@ -3,8 +3,7 @@
 In one pose the faces are halved again and again along the longest side of the box of their centroids,
 down to leaves of LANES neighbouring faces; samples likewise to groups, by their places at rest. A sample
 may be restricted to the faces near its own place at rest: which leaves a group may meet is then known for
-good. A search begins with the face that its caller remembers from before: any face is an upper bound, and
-a good one leaves little to look at.
+good. A search begins with the face that its caller remembers from before.
 
 An answer depends on mesh and point alone, never on what was remembered: bounds (leaf_bounds) decide what
 is looked at, of faces at the same distance the one of lowest index answers, and a face is left out only

@@ -13,13 +13,9 @@ Where one is missing, a solver with a slower way says so once (`warn_slow_path`)
 term.
 
 Gauss-Seidel sweeps (vertex block descent, XPBD) move vertices between one element and the next, so their
-kernels work on one element at a time, in float64; tests/benchmarks/methods/test_minimisers.py holds them
-to the energies' gradients and Hessians.
-
-Training on a CPU evaluates one mesh in some fifty configurations, so each element is worked out for
-TRAINING_LANES of them at once, in float32: the innermost loop has a fixed length and no branch, and the
-compiler turns it into vector instructions. Vertices lie in memory as (C, V, 3, TRAINING_LANES), see
-snug.kernels.skinning.
+kernels work on one element at a time, in float64. Training on a CPU evaluates one mesh in some fifty
+configurations, so each element is worked out for TRAINING_LANES of them at once, in float32 and in the
+layout of snug.kernels.skinning.
 """
 
 from __future__ import annotations

@@ -9,10 +9,9 @@ The folders lie in `__pycache__` beside the module, else in the user's cache fol
 where that is set.
 
 A solver that serves any term gets the term's kernel when it runs. `kernel_argument` hands one over so
-that it is compiled in, as if it had been called by its name; the caller is compiled anew for each set of
-kernels. The argument is an array whose one field is named after the kernel and the digest of its source.
-So numba's type of it names the kernel, what numba keeps on disk is found again by another process, and a
-call costs no more than that of any other array.
+that it is compiled in, as if it had been called by its name. The argument is an array whose one field is
+named after the kernel and the digest of its source. So numba's type of it names the kernel, and what numba
+keeps on disk is found again by another process.
 """
 
 from __future__ import annotations

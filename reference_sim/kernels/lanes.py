@@ -5,10 +5,9 @@ array u of known size, row after row, works them out in a loop of fixed length w
 the results out one by one. Within one array the compiler knows that nothing overlaps.
 
 Float32: the state of early-stopped L-BFGS is u (3V,), the displacement [m] from a point x_0 that float64
-has. Differences of positions are taken there once a step, and each element keeps its own; so round-off is
-that of a displacement of millimetres and not of a body metres away. Elements come in blocks of
-LANES_FLOAT32, the last one filled up with elements of no stiffness; arrays of a block lie one quantity
-after the other.
+has; so round-off is that of a displacement of millimetres and not of a body metres away. Elements come in
+blocks of LANES_FLOAT32, the last one filled up with elements of no stiffness; arrays of a block lie one
+quantity after the other.
 
 Rows: numba writes a short loop of known length out number by number, and what was stored in single
 numbers cannot be loaded as a vector before all of it has reached the cache. So rows are moved in vector

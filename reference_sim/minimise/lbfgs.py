@@ -4,13 +4,10 @@ The first guess of the inverse Hessian is the inverse of an n x n matrix that x,
 dt^2, (mu + lambda/2) times the cotangent Laplacian, and the curvature of the contacts (Liu, Bouaziz and
 Kavan 2017). It is factorised once per minimisation and costs three triangular solves an iteration, so the
 first hundredth of the gap comes several times sooner than with Newton; the last digits do not. So Newton
-takes over where the relative residual is SWITCH, and its factorisations serve several steps each. The
-first has all negative curvature taken out, which saves 13 to 20 % of the factorisations of a T-shirt's
-step.
+takes over where the relative residual is SWITCH, and its factorisations serve several steps each.
 
 What comes before Newton needs no more than float32. So it is compiled.CompiledLBFGS, where that has
-kernels for all terms: an iteration is then so cheap that it goes on to COMPILED_SWITCH. Newton ends in
-float64 either way, at the same tolerance.
+kernels for all terms, and goes on to COMPILED_SWITCH.
 """
 
 from __future__ import annotations

@@ -3,8 +3,9 @@
 Each iteration solves H p = -g and takes the full step. Where the Cholesky factorisation of H does not
 exist, a share of the elements' negative curvature is taken out, CONVEXITY at one projection level after
 another, and only when all of it was not enough (cloth without inertia) H is shifted by sigma M/dt^2.
-Taking all of it out always, as is common, needs several times the iterations once cloth wrinkles. With
-start_projected=True the first iteration begins so.
+Taking all of it out always, as is common, needs several times the iterations once cloth wrinkles. The
+first iteration of a step of moving cloth nearly always needs all of it out: with start_projected=True it
+begins so.
 
 The minimum of stiff cloth lies along a narrow, curved valley of the energy. A full step along it ends
 where stresses computed from the strain are false by orders of magnitude. So the Hessian takes the

@@ -5,9 +5,8 @@ resting limb t_j into theirs there, d_b: its far end then points along G_b A_j t
 is twisted about itself follows from its hinge where the file has one. Else A_j is the smallest turn, and
 the zero pose must be a T or A pose.
 
-Joints are matched with ours by common names: limbs by name; pelvis, spine and neck by place. The pelvis
-is where the legs meet, the spine leads from there to where the arms meet, and the neck from there to the
-head.
+Limbs are matched with ours by common names; the pelvis is where the legs meet, the spine leads from there
+to where the arms meet, and the neck from there to the head.
 """
 
 from __future__ import annotations
