@@ -51,8 +51,7 @@ class Obstacle:
         faces: (F, 3) outward wound.
         rest_positions: (B, 3) [m], the obstacle in the pose in which the cloth was made. With it, a cloth
             sample only ever meets faces whose rest centroid lies within `region` [m] of the sample's own
-            rest position (the whole mesh, where there is none): without that rule arms hold the shirt
-            fast and legs the hem.
+            rest position (the whole mesh, where there is none).
 
     Raises MeshError for wrong shapes, NaN, a mesh that is no closed surface (see `check_closed`).
 

@@ -110,9 +110,6 @@ def declared_energies(cloth: Cloth) -> tuple[Energy, ...]:
 def with_self_contact(energies: tuple[Energy, ...]) -> tuple[Energy, ...]:
     """Return the terms and the barrier of their cloth against itself, a term of the simulation alone.
 
-    Where the body leaves less room than two layers of cloth need, cloth goes into the body, never through
-    itself (see reference_sim.energies.contact_barrier).
-
     Raises:
         ImportError: ipctk is not installed.
         ValueError: a triangle of the mesh is less than DISTANCE high; the message names it.
@@ -177,8 +174,7 @@ def build_dependence(
 ) -> BuiltScene:
     """Build the scene with so many `vertices`, by default those of the middle mesh, and `substeps` a frame.
 
-    Numbers of two meshes are two definitions of the energy, of contact and of curvature, so they are
-    reported and never judged.
+    Numbers of two meshes are reported and never judged.
     """
     garment = find_template(scene.garment).tailor(assets.body, vertices=vertices or dependence.middle)
     motion = make_motion(scene.motion).cut(0, dependence.frames)

@@ -1,7 +1,6 @@
 """Scene that a stored roll-out brings itself: cloth at rest from a mesh, body, and start from the file.
 
-So the pickles of HOOD and ContourCraft are judged, which name neither a motion nor a garment of this
-project.
+So the pickles of HOOD and ContourCraft are judged, which name no motion and no garment.
 """
 
 from __future__ import annotations

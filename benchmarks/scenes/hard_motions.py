@@ -3,9 +3,8 @@
 Walks made hard start in the walk's first pose and share its settled shirt; but for the extreme shapes,
 which start in T-pose in the shirt's own rest shape, fitted to that body.
 
-Nobody simulates a thousand frames and more, so there is no body to collide with. Only some frames are
-kept: those of two stretches that show the same motion, early and late, and of a loop one in fifty
-besides.
+Nobody simulates a thousand frames and more. Of these only two stretches are kept that show the same motion,
+early and late, and of a loop one frame in fifty besides.
 """
 
 from __future__ import annotations

@@ -5,8 +5,7 @@ In free fall backward Euler's own discrete answer is exact,
     x_n = x_0 + n dt v_0 + g dt^2 n (n+1)/2
 
 The parabola of the continuous problem is not the answer: at 30 frames per second it is 0.16 m away after
-one second. With weight alone every vertex moves alike, so that strain and bending have nothing to do and
-are not declared.
+one second. With weight alone every vertex moves alike, so strain and bending are not declared.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Physical terms: formula with its source, definition in torch, kernels in float64, in one file each.
 
 Beside it lies, where a term has them, a file of the kernels for solvers and training. A new term is one
-file and its line in `__init__.pyi`. A file is imported when the term's name is first used: a scene
-without contact loads none.
+file and its line in `__init__.pyi`. A file is imported when the term's name is first used.
 
 >>> from reference_sim import Cloth
 >>> from reference_sim.energies import StretchStVK

@@ -3,8 +3,7 @@
     q = det(F^T F)                      squared area ratio
     E = -kappa A (q - q0)^2 ln(q / q0)  for q < q0, else 0
 
-The form is IPC's barrier (Li et al. 2020) applied to q. Not part of the paper: a scene declares it, and
-its energy is a column of its own. Above q0 = 0.1 (a third of the area lost in each direction) it is zero.
+The form is IPC's barrier (Li et al. 2020) applied to q. Not part of the paper: a scene declares it.
 """
 
 from __future__ import annotations

@@ -3,10 +3,8 @@
     d = n . (x_s - c)                   distance to the sample's contact plane (point c, unit normal n)
     E = k a_s max(eps - d, 0)^3         k [J/m^5], a_s [m^2]
 
-The exact distance to a moving body has jumps where a sample is pinched between two limbs, and Newton's
-method does not survive them; so each sample gets one plane per step, taken at the initial guess and
-frozen (`Obstacle.planes`), and this energy is the distance to that plane. The true signed distance is a
-metric.
+The exact distance to a moving body has jumps where a sample is pinched between two limbs. So each sample
+gets one plane per step, taken at the initial guess and frozen (`Obstacle.planes`).
 
 Samples sit on vertices, edge midpoints and face centroids. a_s makes k a density: each of the three kinds
 of sample carries the whole area of the cloth once, so that a finer mesh does not get a stiffer contact.

@@ -187,8 +187,7 @@ class Energy:
     def predict_stress(self, x: np.ndarray, step: np.ndarray) -> None:
         """Let the Hessian take, until `forget`, the stresses that linear strain predicts at x + step (V, 3).
 
-        Energy and gradient know nothing of it. For stiff terms whose Hessian holds stress: computed from
-        the strain after a long step, it would be false by orders of magnitude.
+        Energy and gradient know nothing of it. For stiff terms whose Hessian holds stress.
         """
 
     def forget(self) -> None:

@@ -112,8 +112,7 @@ class StretchStVK(Energy):
     def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return (mu + lambda/2) times the cotangent Laplacian.
 
-        At rest the Hessian's mean over directions is (lambda + 3 mu)/2 of it in the plane of the cloth
-        and lambda/3 + mu of it in space; this lies between the two.
+        This lies between the rest Hessian's mean over directions in the plane of the cloth and in space.
         """
         b = np.concatenate([-self.Dm_inverse.sum(axis=1, keepdims=True), self.Dm_inverse], axis=1)
         scale = (self.mu + 0.5 * self.lam) * self.areas

@@ -5,9 +5,8 @@ down to leaves of LANES neighbouring faces; samples likewise to groups, by their
 may be restricted to the faces near its own place at rest: which leaves a group may meet is then known for
 good. A search begins with the face that its caller remembers from before.
 
-An answer depends on mesh and point alone, never on what was remembered: bounds (leaf_bounds) decide what
-is looked at, of faces at the same distance the one of lowest index answers, and a face is left out only
-if it is farther by more than round-off. Distances are in float64 even where the mesh is kept in float32.
+An answer depends on mesh and point alone, never on what was remembered: of faces at the same distance the
+one of lowest index answers, and a face is left out only if it is farther by more than round-off.
 """
 
 from __future__ import annotations

@@ -170,7 +170,7 @@ def _face_bounds(leaf, lanes, x, y, z, g, out):
     """Write the squared distances from a sample to the faces of a leaf into row g of out.
 
     In the frame of each face: its height, and in its plane the distance to the nearest side, where the
-    foot is beyond one. Both change no faster than the sample moves, so that round-off stays round-off.
+    foot is beyond one.
     """
     zero = np.float32(0.0)
     for i in range(LANES):

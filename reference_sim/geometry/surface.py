@@ -47,8 +47,7 @@ def faces_around(faces: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]
 def normals_of_corners(some, positions, faces, starts, around):
     """Return the `vertex_normals` (B, 3) of the corners of some faces (n,); all others stay unset.
 
-    starts, around: see `faces_around`. Cloth meets a part of a body; to sum up all of it would take
-    longer.
+    starts, around: see `faces_around`.
     """
     normals, known = np.empty_like(positions), np.zeros(len(positions), np.bool_)
     for s in some:
@@ -103,9 +102,8 @@ def plane_normals(points, closest, closest_faces, barycentric, vertices, faces, 
 
     A sample that looks along the surface, or is below it and beyond the border of the faces that it may
     meet (another face at the closest point c leads nearer), meets a ball that touches the surface in c
-    from below: the normal points to the sample from the ball's point opposite to c. By Thales' theorem
-    n.(x - c) is negative in that ball alone; where the sample is much nearer than the ball is wide, the
-    plane is the tangent. starts, around: see `faces_around`.
+    from below: the normal points to the sample from the ball's point opposite to c. starts, around: see
+    `faces_around`.
     """
     of_vertices = normals_of_corners(closest_faces, vertices, faces, starts, around)
     for s in range(len(points)):
@@ -174,9 +172,8 @@ def winding_numbers(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray)
     """Return how often a closed mesh of vertices (B, 3) winds around points (P, 3) [m]: (P,).
 
     Faces are wound outwards; a point on the surface counts as one beside it. Rays run along the shortest
-    side of the mesh's bounding box, so that each meets few faces; a grid over the other two axes has the
-    faces that a ray may meet. A ray through a side or a corner is moved by less than any number, the same
-    way for all faces, so that it passes each of them once.
+    side of the mesh's bounding box; a grid over the other two axes has the faces that a ray may meet. A ray
+    through a side or a corner is moved by less than any number, the same way for all faces.
     """
     numbers = np.zeros(len(points), np.int64)
     low, high = vertices.min(axis=0), vertices.max(axis=0)

@@ -5,8 +5,7 @@ It does not see a change in another file: in a kernel that is called, or in a co
 So each module's kernels are kept in a folder whose name holds a digest of the file and of both. Processes
 with the same sources find the same folder.
 
-The folders lie in `__pycache__` beside the module, else in the user's cache folder, or in NUMBA_CACHE_DIR
-where that is set.
+The folders lie in `__pycache__` beside the module, else in the user's cache folder, or in NUMBA_CACHE_DIR.
 
 A solver that serves any term gets the term's kernel when it runs. `kernel_argument` hands one over so
 that it is compiled in, as if it had been called by its name. The argument is an array whose one field is

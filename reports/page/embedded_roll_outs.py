@@ -1,10 +1,8 @@
 """Roll-outs embedded in the page: cloths, their colours and curves, and a coarser body.
 
-Packed arrays, as the page carries them: integers, predicted from frame to frame, deflated, in base64.
-
-The browser undoes it (data.js). Positions are 16-bit steps of one length per trajectory, so they are off
-by half a step at most; values per vertex are 8 bits on the scale of square roots, fine where they are
-small.
+Packed arrays are integers, predicted from frame to frame, deflated, in base64, which data.js undoes.
+Positions are 16-bit steps of one length per trajectory; values per vertex are 8 bits on the scale of square
+roots.
 """
 
 from __future__ import annotations

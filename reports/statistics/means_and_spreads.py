@@ -1,9 +1,7 @@
 """Means of rows over scenes and seeds, and ±, the spread over seeds or the uncertainty of the reference.
 
-Only finite values of cells that ended ok, or stalled at some frames, enter a mean; a mean says when one
-of its cells stalled. Nothing is filled in for a cell that failed.
-The mean is first taken over the scenes of one seed, then over seeds; the spread is the standard
-deviation over seeds (n - 1), absent for a single seed.
+Only finite values of cells that ended ok, or stalled at some frames, enter a mean. It is first taken over
+the scenes of one seed, then over seeds; the spread is the standard deviation over seeds (n - 1).
 """
 
 from __future__ import annotations

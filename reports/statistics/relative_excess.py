@@ -5,8 +5,7 @@ Of the total energy E of one motion and seed it is
     100 (E(method) - E(reference)) / (E(skinning) - E(reference)),
 
 0 for the reference, 100 for the garment that only follows the skin, and below 0 for less energy than the
-reference has. The zero of potential energy cancels. It is the primary measure of how near a method is.
-Any other energy whose zero is a choice, as gravity, is divided by the same excess of the total.
+reference has. Any other energy whose zero is a choice, as gravity, is divided by the same excess.
 """
 
 from __future__ import annotations

@@ -28,10 +28,7 @@ CLAIMS_NOTE = (
     "Effect: × the first over the second, of geometric means; of energies whose zero is a choice, points of "
     "relative excess between the two; of frames, the first's share less half. Below: the 95 % interval over "
     "motions and seeds (of points with the mean nearer to 0 held), of costs the range. p: of primary claims "
-    "by Holm for the whole family. Tie: all of the interval within 5 % of equality, or the noise of the "
-    "reference if that is wider. A claim is decided where p < 0.05, the difference exceeds that noise and "
-    "has the same sign against simulations with smaller time steps; of costs where the range lies on one "
-    "side. Inconclusive: anything else, fewer than four motions, a network of one seed."
+    "by Holm for the whole family. The rule of verdicts is that of docs/statistics.md."
 )
 
 
@@ -66,8 +63,7 @@ def findings(run: Run) -> list[Table]:
 EXCESS_NOTE = (
     "Typical: mean over motions and seeds of arcsinh(x / 1 %), taken back: a geometric mean well above 1 %, "
     "arithmetic well below. Segments of a recording count as one motion. Uncertain by: the noise, of what "
-    "the start of the reference changes. Energy: more or less where p < 0.05, the difference exceeds that "
-    "noise, and it has the same sign against each simulation with smaller time steps."
+    "the start of the reference changes. The rule of verdicts is that of docs/statistics.md."
 )
 
 

@@ -1,8 +1,8 @@
 """Parametric human: template, shape directions, joints and skinning weights, in the layout of SMPL.
 
 Rest pose: T-pose, y up, facing +z, left arm along +x, metres. The body of the package stands with its
-soles on y = 0 and its pelvis above the origin, for every shape. A posed vertex is the skinned rest vertex plus the translation: joint 0 is at joints(betas)[0] +
-translation.
+soles on y = 0 and its pelvis above the origin, for every shape. A posed vertex is the skinned rest vertex
+plus the translation: joint 0 is at joints(betas)[0] + translation.
 """
 
 from collections.abc import Callable

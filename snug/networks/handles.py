@@ -3,16 +3,14 @@
     offsets(theta)_v = sum_b w_b(v) A_b(theta) [(r_v - c_b) / h; 1]        (shape_functions)
 
 A small network gives the twelve numbers of each A_b: a perceptron that sees one pose, as PBNS does, or
-recurrent units that see the motion and their own past, as SNUG's do. So it has a tenth of SNUG's weights,
-and what it can express is the span of the shape functions (method `handles-80-floor`), whatever it has
-learned.
+recurrent units that see the motion and their own past, as SNUG's do. What it can express is the span of the
+shape functions (method `handles-80-floor`).
 
 The offsets are of the unposed garment r, as SNUG's, so that it is skinned. The centres c are farthest
 points of the garment, each the vertex that lies farthest from those before it. The weights are compact,
 w_b ~ (1 - d_b/R)^4 (4 d_b/R + 1) for distances d_b < R (Wendland 1995), and sum to one in each vertex, so
 that equal transforms of all handles move the garment affinely. h is the covering radius, the largest
-distance of a vertex from its nearest centre; R = REACH h. Distances are straight: those along edges leave
-more of the energy above the minimum (docs/notebook/training.md).
+distance of a vertex from its nearest centre; R = REACH h. Distances are straight.
 """
 
 from __future__ import annotations

@@ -3,8 +3,7 @@
     offsets_t = D(z_s + z_d),   z_s = static encoder(pose_t),   z_d = GRU(dynamic encoder(motion_1..t))
 
 Nothing in the dynamic branch has a bias, and the motion of a body at rest is zero: where nothing has
-moved, z_d is zero and the garment is D(z_s). So the branches are apart by their form, without a loss of
-their own. In training a fifth of a batch has codes z_d of other windows (motion augmentation).
+moved, the garment is D(z_s). In training a fifth of a batch has codes z_d of other windows.
 
 The inputs are of the joints near a garment:
 
