@@ -208,8 +208,7 @@ def strip_over_drum(columns: int, stiffness: float) -> tuple[sim.Cloth, np.ndarr
     """Return a strip held at both ends, its points in the plane (V,2), and on the drum (V,3) [m].
 
     It is pulled by PULL, and its ends hang straight down. stiffness: of contact [J/m^5], by which it lies
-    in the margin. The strip is a hundred times stiffer than cotton: it keeps its length, and the exact
-    formulas need no stretch.
+    in the margin. The strip is a hundred times stiffer than cotton, as the exact formulas need no stretch.
     """
     from reference_sim.energies.contact_penalty import DEFAULT_MARGIN
 

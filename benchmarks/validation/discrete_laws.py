@@ -136,7 +136,6 @@ def unique_step() -> float:
 
     The membrane's Hessian is never below -(lambda + mu) times the cotangent Laplacian, so a step shorter
     than h (rho_a / (8 (lambda + mu)))^0.5 on right triangles of spacing h has one minimiser and no other.
-    At 1/30 s, far above that bound, two valid solvers may differ.
     """
     bound = SPACING * np.sqrt(COTTON.areal_density / 8 / (COTTON.lame_lambda + COTTON.lame_mu))
     cells = 12

@@ -2,9 +2,8 @@
 
 The energy may not rise, everything is finite, and a claim of convergence is true by a path that shares no
 kernel with the solver (convergence_check.py). A false claim, a NaN, a crash and a hang are failed rows;
-an honest "stalled", "diverged" or "timeout" keeps that name and its reason. What stands in a case's
-options is all that differs from an ordinary step of 1/30 s of a sheet 0.4 m wide, 81 vertices, held at
-two corners.
+an honest "stalled", "diverged" or "timeout" keeps that name and its reason. A case's options are what
+differs from an ordinary step of 1/30 s of a sheet 0.4 m wide, 81 vertices, held at two corners.
 
 Starts that are symmetric to the last bit are saddles of the energy: they are perturbed by a micrometre,
 but for `flat` and `point`, which are saddles on purpose.

@@ -81,8 +81,6 @@ def friction_landing() -> float:
     """Return the speed that a sliding patch keeps when it lands, over v - mu (v_n + g t).
 
     The table gives it the momentum m (v_n + g t) upwards, and takes mu times that of its sliding.
-    Friction is a step late, but loses nothing: the force before the first step is that of the last, its
-    weight.
     """
     path = _patch(frames=16, velocity=np.array([THROWN, -FALLING, 0.0]))
     kept = THROWN - MU * (FALLING + sim.GRAVITY * 15 * DT)

@@ -12,7 +12,7 @@ trousers the torso ends at the crotch and a leg begins, one convex section per h
 
 Convex sections grown by d have 2 pi d more girth (Steiner's formula), so ease of girth e is a growth of
 e/(2 pi); it sets in between armpit and waist, and between shoulder and cuff. Only the half x >= 0 is
-built; the other half is its mirror image, so the garment is exactly symmetric.
+built, and mirrored.
 """
 
 from __future__ import annotations

@@ -4,9 +4,8 @@
     regression:     offsets(theta) = mean + D W (r(theta) - mean)
 
 over the K nearest r_k, and with principal components D of the offsets. Both learn offsets of the unposed
-garment from simulated frames in one go; a network has to do better from the same frames. r are the
-numbers of a pose (DressedBody.features): for the first up in the root's axes and two columns of each
-joint's rotation as they are, so that |r - r_k| is a distance of rotations.
+garment from simulated frames in one go. r are the numbers of a pose (DressedBody.features): for the first
+up in the root's axes and two columns of each joint's rotation as they are.
 """
 
 from __future__ import annotations

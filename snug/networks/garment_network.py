@@ -1,8 +1,7 @@
 """Base class of the networks that dress a body: body motion in, offsets of the unposed garment out.
 
 They start from random weights by the rules of torch or of Keras, in which SNUG's authors train. The two
-differ by orders of magnitude in the joules of the first frames: noise of centimetres between neighbouring
-vertices is a great strain.
+differ by orders of magnitude in the joules of the first frames.
 """
 
 from __future__ import annotations

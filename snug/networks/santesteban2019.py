@@ -3,11 +3,9 @@
     offsets(beta, theta_1..t) = fit(beta) + wrinkles(beta, theta_1..t)
     fit: 10 -> 20 (ReLU) -> 3V,   wrinkles: one GRU of 1500, one linear layer to 3V
 
-It learns simulated vertices, as the supervised network does. Its authors train the
-two parts one after the other, the fit on drapes of many bodies in one pose; here both are trained
-together on the simulated motions. Those show the mean body alone: the fit gives a constant, a mean drape,
-and its numbers say nothing of how it would do on other bodies. The authors' collision post-processing
-(2 mm) is no part of the network.
+It learns simulated vertices. Its authors train the two parts one after the other, the fit on drapes of many
+bodies in one pose; here both are trained together on the simulated motions of the mean body, so the fit can
+only give a constant. The authors' collision post-processing (2 mm) is no part of the network.
 """
 
 from __future__ import annotations

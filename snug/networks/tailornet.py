@@ -4,10 +4,8 @@
 
 Both have three layers of 1024 with ReLU, dropout 0.2 after the first; they learn by L1 in the unposed
 space (snug.training.simulated_data.BandTargets): low the diffusion-smoothed offsets of the simulation,
-high the rest. With its authors the high band is a mean of several networks, each of a pivot, that is of a
-body shape and a style of garment, weighed by the distance from it. Our simulated motions show the mean
-body in one style: one pivot, of weight one, is all that they can teach, and memory and run time are those
-of one pivot instead of twenty. A static method: it sees one pose.
+high the rest. With its authors the high band is a mean of some twenty networks, each of a pivot, that is of a
+body shape and a style of garment. Our simulated motions show the mean body in one style, hence one pivot.
 """
 
 from __future__ import annotations

@@ -1,14 +1,10 @@
 """Augmented training motions: limbs of different clips put together, mirrored, and turned a little.
 
-Self-supervision needs no simulation, so a training set is not bound to what was recorded. Recorded clips
-show a network few combinations of legs, spine and arms, and on a new kind of motion it then extrapolates.
+Recorded clips show a network few combinations of legs, spine and arms.
 A mixed clip takes the root, the spine, each leg and each arm from six random places of the training clips
 (mirrored half of the time), scales legs and spine, adds to each joint that carries cloth a slow turn
 about a random axis, lifts some thighs, hangs each arm at a random distance from the torso, and opens the
-hips where a thigh comes too near to it. Legs that always come as a pair show no lunge; a network that has
-met no thigh as high as in a squat lets it through the hem; and people, unlike tables of angles, let their
-arms hang close to the torso and turned in their sockets. Every part stays continuous in time, so
-velocities keep their meaning.
+hips where a thigh comes too near to it. Every part stays continuous in time.
 """
 
 from __future__ import annotations
