@@ -56,9 +56,8 @@ def by_name(what: str, entries: Iterable[Entry]) -> dict[str, Entry]:
 def load(module: str) -> ModuleType:
     """Import the module of that dotted name, or of that file: an absolute path that ends with ".py".
 
-    A file is imported by its stem. Its folder is put behind all others from which modules are imported,
-    so that it finds what lies beside it, and nothing of ours is hidden. Raises DeclarationError where its
-    stem means another module, and whatever its import raises.
+    A file is imported by its stem, its folder last of those from which modules are imported. Raises
+    DeclarationError where its stem means another module, and whatever its import raises.
     """
     if not module.endswith(".py"):
         return importlib.import_module(module)

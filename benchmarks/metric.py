@@ -2,7 +2,7 @@
 
 A file of benchmarks/metrics declares Measurements: metrics, and the functions that measure them. A user's
 file behind --set metrics= holds METRICS, a tuple of Metric, and functions called measure, compare, series
-and judge. That is all it takes to have a metric measured, written, tabulated and defined in the report.
+and judge.
 """
 
 from __future__ import annotations

@@ -1,8 +1,7 @@
 """Origin of a number: content, code, packages and machine that it was computed with.
 
-As digests they make a stored result stale; in words they stand on every row. A task names the folders and
-files that its outcome depends on (benchmarks.runner.schedule); each counts as a whole, and no import is
-followed. A user's file counts with the modules that lie beside it.
+A task names the folders and files that its outcome depends on (benchmarks.runner.schedule); each counts as
+a whole, and no import is followed. A user's file counts with the modules that lie beside it.
 """
 
 from __future__ import annotations

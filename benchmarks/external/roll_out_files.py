@@ -253,8 +253,7 @@ def fit_to_scene(
 def _check_place(positions: np.ndarray, expected: np.ndarray, *, ordered: bool) -> None:
     """Raise RollOutFileError unless the cloth (T,V,3) [m] starts at the expected place and goes its way.
 
-    Another unit, axis or order of vertices, a mirrored world and another motion are far from it. A
-    roll-out that explodes in the end is a result: the way counts in most of the frames. Of another mesh
+    A roll-out that explodes in the end is a result: the way counts in most of the frames. Of another mesh
     the bounding boxes are compared.
     """
     first, size = positions[0], float(np.linalg.norm(np.ptp(expected[0], axis=0)))

@@ -79,9 +79,8 @@ def given_frames(
 ) -> Callable[[int, np.ndarray], np.ndarray]:
     """Return the function of step and x (V, 3) [m] that gives the first guess (V, 3) [m] of a step from x.
 
-    Steps are asked for in turn, from 1, where `start` begins the frames anew. With `carry`, SHARE of the
-    last frame's residual, carried by the skin, is added to each. The residual is what the solver added to
-    the frame before: where the step starts, less the frame given there.
+    Steps are asked for in turn, from 1, where `start` begins the frames anew. With `carry`, SHARE of what
+    the solver added to the frame before, carried by the skin, is added to each.
     """
     frames: Iterator[np.ndarray]
     given = np.zeros((0, 3))

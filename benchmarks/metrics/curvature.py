@@ -88,7 +88,7 @@ def mean_curvature(x: Vertices, faces: Faces) -> tuple[Floats, Floats]:
     """Return the magnitude of mean curvature (V,) [1/m] and the mixed Voronoi area (V,) [m^2] of each vertex.
 
     Values at boundary vertices are returned as computed; mask them with `boundary_mask`. A vertex of zero
-    area gets curvature 0 and, as its area is 0, weighs nothing in any mean.
+    area gets curvature 0.
 
     >>> from benchmarks.meshes import icosphere
     >>> round(float(mean_curvature(*icosphere(3, 0.25))[0].mean()), 3)

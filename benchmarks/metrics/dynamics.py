@@ -5,7 +5,7 @@ A method's dynamic part is what motion adds to its own static answer:
     D(t, v) = x(t, v) - x_static(t, v),  less its mean over time for each hem vertex v
 
 with x_static the simulator's quasi-static solution of the same frames for a solver, and for a network its
-output once each pose has been held still. Neither the energy gap of a step nor the inertia term shows D.
+output once each pose has been held still.
 
     amplitude    rms D / rms D of the simulator
     correlation  <D, D_sim> / (|D| |D_sim|)
@@ -178,8 +178,7 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
 def shares_quasi_static(entry: MethodEntry) -> bool:
     """Return whether the simulation's quasi-static solution is the method's too, where it returns none.
 
-    It is that of solvers that minimise the reference's potential from their last frame; not of another
-    material, of a network, or of a method that says nothing of itself.
+    It is that of solvers that minimise the reference's potential from their last frame.
     """
     return entry.static_known and entry.role in ("reference", "reference-variant", "solver")
 

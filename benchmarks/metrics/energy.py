@@ -1,9 +1,8 @@
 """Metrics energy/*: every declared term at every frame, by the very terms that were minimised.
 
 Each method is judged on its own history: inertia compares a frame with the two before it in the same
-trajectory, and contact planes are searched at the method's own positions. A frame before the third has no
-two before it; it counts as moving freely, hence inertia 0 there. Means are over the frames after the
-warm-up.
+trajectory, and contact planes are searched at the method's own positions. The first two frames have an
+inertia of 0. Means are over the frames after the warm-up.
 
 `energy/bending_printed` is of the same hinges, not scaled, as the SNUG paper prints them. It is no part of
 the total.
@@ -32,8 +31,7 @@ if TYPE_CHECKING:
 def copied_terms(scene: BuiltScene) -> list[Energy]:
     """Copy the terms that the scene declares, and inertia, to be prepared for one trajectory alone.
 
-    A term may remember the step before, and read another term: so all are copied together, and what one
-    of them knows of another is the other's copy. Arrays are shared with the scene's.
+    What one of them knows of another is the other's copy. Arrays are shared with the scene's.
     """
     declared = (*scene.energies, Inertia(scene.cloth, scene.dt))
     twins = {id(term): copy.copy(term) for term in declared}

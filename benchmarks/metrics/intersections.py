@@ -1,9 +1,8 @@
 """Metrics intersections/*: a cloth through itself, in a frame and between two frames.
 
 On the straight way of every vertex from one frame to the next a vertex meets a triangle, or an edge an
-edge, where the four points are
-in one plane and their primitives touch (Provot 1997). Broad phase and test are those of the package
-ipctk, by tight inclusion (Wang, Ferguson, Schneider, Jiang, Attene and Panozzo 2021).
+edge, where the four points are in one plane and their primitives touch (Provot 1997). Broad phase and test
+are those of the package ipctk, by tight inclusion (Wang et al. 2021).
 """
 
 from __future__ import annotations

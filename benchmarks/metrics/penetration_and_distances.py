@@ -79,8 +79,7 @@ def rms(x: Positions, y: Positions) -> float:
 def distance_rms(positions: Positions, reference: Positions) -> Floats:
     """Return the root mean square distance between the same vertices of each frame, (T,) [m].
 
-    Two accurate solvers of one wrinkling step differ by centimetres, since it has several minima: read
-    this beside the spread between two references, never alone.
+    Two accurate solvers of one wrinkling step differ by centimetres, since it has several minima.
     """
     return np.sqrt(((positions - reference) ** 2).sum(2).mean(1))
 
@@ -159,8 +158,7 @@ def penetration(
 def own_part_depth(positions: Positions, obstacle: Obstacle, rest_positions: Vertices) -> Floats:
     """Return the depth of each vertex under the part of the body that it belongs to, (T,V) [m].
 
-    The true signed distance also counts cloth in the fold of a hip or between arm and chest, which no eye
-    sees; this one measures against the faces near a vertex's own rest position alone.
+    It is measured against the faces near a vertex's own rest position alone.
     """
     depth = np.empty(positions.shape[:2])
     for frame, x in enumerate(positions):

@@ -104,9 +104,7 @@ def _means(name: str, patterns: Sequence[str]) -> bool:
 def scenes_of_parts(read: ReadStudy) -> dict[str, list[str]]:
     """Return part -> names of its scenes.
 
-    A scene that field `scenes` names and no part lists is met in the first part with a scene of its kind:
-    called by its whole name (without such a part in the first), or in a motion of the split by a pattern
-    that no listed scene has, as 'trousers/*'.
+    A scene that field `scenes` names and no part lists is met in the first part with a scene of its kind.
     """
     declared, wanted, parts = read.scenes, read.study.scenes, read.study.parts
     usual = {

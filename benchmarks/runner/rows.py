@@ -118,8 +118,7 @@ def clock_costs(cell: Cell, repeats: int, outcomes: Outcomes) -> tuple[dict[str,
 
     They are cost/frame and its percentiles, cost/whole, cost/batch [ms], cost/spread [%], cost/peak [MB].
 
-    Times are medians of the repeats, but for those of inputs; these and the peak are of the first run. A
-    frame's time is that of the whole run over the frames computed.
+    Times are medians of the repeats; those of inputs, and the peak, are of the first run.
     """
     first, remark = outcomes[cell.id()], ""
     batch = outcomes.get(cell.id("batch"), Outcome("skipped"))
