@@ -168,8 +168,7 @@ class MethodEntry:
         gives_first_frame: whether it computes frame 0 too, as networks do; other methods are given the
             start.
         timed: whether its run time is measured in scenes that measure run times.
-        declared_ms: [ms] a frame, as its author says, where no clock of ours can measure it; provenance
-            of a trajectory may say it as well.
+        declared_ms: [ms] a frame, as its author says, where no clock of ours can measure it.
         other_mesh: whether its vertices and triangles are not the scene's: then only surfaces are
             compared.
         static_known: False of a solver whose quasi-static solution is not the simulation's, and that does

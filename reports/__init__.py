@@ -1,9 +1,7 @@
 """Reports of finished runs: tables, figures, PDF and page; commands that compare, check and film.
 
 Each of these imports only those before it: finished_run, statistics, tables, figures, pictures, blocks
-(the one list of what a report shows), sentences, pdf and page. A new figure is a function of a run and a
-Figure in reports.blocks.BLOCKS, a new table a function in reports.tables.TABLES and a TableBlock in
-BLOCKS.
+(the one list of what a report shows), sentences, pdf and page.
 """
 
 import lazy_loader

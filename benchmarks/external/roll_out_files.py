@@ -8,7 +8,6 @@
 | `.pc2`, `.pc16` | point cache, as Neural Cloth Simulation writes it; faces of the `.obj` of the same name |
 | folder, pattern | one mesh a frame (`.obj`, `.ply` and others), in the order of the numbers in their names |
 
-What a file declares of its size is compared with the file before anything of that size is allocated.
 Nothing is executed. A roll-out that does not fit its scene, in unit, axes, order of vertices, frame rate
 or place, is refused with the remedy.
 """

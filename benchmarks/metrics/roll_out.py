@@ -4,8 +4,7 @@ In motion/* a method is held against itself in the scene's counterpart, the ordi
 that has left the body has diverged; a simulated one has to be left behind by a body that jumps by a metre.
 
 In roll_out/* one motion is seen early and much later. Energies are those of the cloth alone (strain,
-bending, inertia), which need no body; the first two frames of either stretch have no inertia and are left
-out.
+bending, inertia); the first two frames of either stretch are left out.
 """
 
 from __future__ import annotations

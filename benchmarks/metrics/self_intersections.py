@@ -2,8 +2,7 @@
 
 Two triangles without a common vertex intersect where an edge of one crosses the inside of the other.
 Pairs come from a sweep along x over bounding boxes. Triangles that touch in one plane count as apart. The
-line in which two triangles intersect ends at two such crossings; all lines together are the intersection
-contours.
+line in which two triangles intersect ends at two such crossings.
 """
 
 from __future__ import annotations

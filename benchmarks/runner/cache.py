@@ -1,9 +1,8 @@
 """Finished results of a run's folder: which are reused, and which are stale.
 
 An entry names the inputs, code, packages and files that its outcome came of; where one of them is another
-now, the result is stale, and the task is done again.
-An entry is written whole after the files that it speaks of, and holds their digests: what is not as it was
-written is missing, and done again.
+now, the task is done again. It is written whole after its files, and holds their digests: a file that is
+not as it was written is missing.
 """
 
 from __future__ import annotations

@@ -13,7 +13,7 @@ MIT licence), which *is* the definition: there is none in torch. Networks are tr
 Beyond a touch the energy means nothing: a distance has no sign. Hence `largest_step` bounds every line
 search by continuous collision detection, and a step starts without an intersection: by `ccd_fraction` the
 simulator moves the cloth from the start of the step as far as nothing meets, minimises there to gain
-distance, and goes on. Contact with a body is another term's, which gives way where there is no room.
+distance, and goes on. Contact with a body is another term's.
 """
 
 from __future__ import annotations

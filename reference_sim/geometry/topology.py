@@ -75,8 +75,7 @@ LEAST_AREA_RATIO = 1e-12  # area of a face relative to the mean, below which it 
 def check_closed(positions: np.ndarray, faces: np.ndarray) -> None:
     """Refuse positions (T, B, 3) [m] and faces (F, 3) that are no moving closed surface.
 
-    Raises MeshError that names vertex, face or edge, and the remedy: wrong shapes, no frame, NaN, a face
-    without area, an open, non-manifold, inconsistently wound or inside-out mesh.
+    Raises MeshError that names vertex, face or edge, and the remedy.
     """
     moving = positions.ndim == 3 and positions.shape[2] == 3 and positions.size
     if not (moving and faces.ndim == 2 and faces.shape[1] == 3 and faces.size):

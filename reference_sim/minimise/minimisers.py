@@ -155,8 +155,6 @@ class StepMinimiser:
         All vertices move from x to the guess until something would touch. From there pins go on alone; if
         they cannot, a rough minimisation gains distance, and all move on. So the last minimisation starts
         without an intersection, pins at the end of their way.
-
-        The rough minimisations share one timeout, and the last one has its own.
         """
         potential, pins = self.potential, self.potential.cloth.pins
         motion, goal, progress = guess - x, guess, 0.0

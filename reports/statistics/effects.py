@@ -66,8 +66,7 @@ class Effect:
         unit: of a plain difference, what 1 is of: TIE of it is no difference; 0 where that is unknown.
         complete: neither mean lacks a scene or a seed.
         one_seed: whether a mean is of one seed, and nobody knows how far another would move it.
-        exact: whether no clock gave the two, so that one value each is all there is, such as the size of
-            a network.
+        exact: whether no clock gave the two, such as the size of a network.
     """
 
     value: float

@@ -29,9 +29,8 @@ MOST_SLACK = 0.2  # share of a run time within which another one may count as no
 class Point:
     """Run time [ms per frame] and error of a method.
 
-    time_spread: how far runs lie apart [ms]: largest less smallest repeat where it was repeated, else two
-    standard deviations over seeds. error_spread: one standard deviation over seeds or, where that is
-    more, the noise of the reference. Both 0 where unknown.
+    time_spread: largest less smallest repeat [ms], else two standard deviations over seeds. error_spread:
+    one standard deviation over seeds or, where that is more, the noise of the reference. Both 0 if unknown.
     fewer: remark on seeds that are missing, empty where none is.
     """
 

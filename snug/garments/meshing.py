@@ -1,8 +1,7 @@
 """Mesh of a garment from its surface and cuts: half remeshed, kept off the body, mirrored at the seam.
 
-pyacvd's clusters give the number of vertices that was asked for, but a ragged rim. So rim vertices are
-spread evenly along the cut lines of the dense sheet, and the inner ones move towards a weighted mean of
-the triangles around them, kept on the surface, between Delaunay flips.
+pyacvd's clusters give a ragged rim. So rim vertices are spread evenly along the cut lines of the dense sheet,
+and the inner ones move towards a weighted mean of the triangles around them, between Delaunay flips.
 """
 
 from __future__ import annotations

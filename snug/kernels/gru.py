@@ -56,8 +56,7 @@ class FastGRU(torch.autograd.Function):
     """apply(x (N, T, D), state (L, N, H), *weights) -> (N, T, H), (L, N, H).
 
     weights: input, hidden, input bias, hidden bias of each layer. Differentiable once, by the weights
-    alone: neither inputs nor the state at the start are trained, and the state that comes out is a
-    constant. Between products a row of units is as wide as the next multiple of TRAINING_LANES, and 0
+    alone. Between products a row of units is as wide as the next multiple of TRAINING_LANES, and 0
     beyond H.
     """
 
