@@ -158,8 +158,7 @@ def open_assets(
 ) -> Assets:
     """Tailor these garments to the body, but for the user's, and cut motions to the preset's lengths.
 
-    Those named in `training` have another length. Raises ValueError for a garment that cannot be
-    tailored.
+    Those named in `training` have another length. Raises ValueError for one that cannot be tailored.
 
     >>> assets = open_assets(find_preset("smoke"), embedded_motions(["walk"]), ["tshirt"])  # doctest: +SKIP
     """

@@ -1,8 +1,7 @@
 """python -m reports.build RUN_DIR: tables, figures, page and PDF of a finished run.
 
 Reads run.json, results.csv, frame_energies.csv and trajectories in RUN_DIR, and nothing else; writes
-tables/*.csv, figures/*.svg and *.png, report.html and report.pdf there. Of a run without trajectories,
-pictures of roll-outs that lie in figures/ stay and stand in the PDF.
+tables/*.csv, figures/*.svg and *.png, report.html and report.pdf there.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ Collision post-processing pushes vertices below or within 2 mm of the skin out t
     x' = x + max(2 mm - n.(x - c), 0) n      c: closest body point that x may touch, n: the skin's normal
 
 The released SNUG models and Santesteban 2019 end with such a step. Here it is a method of its own, and is
-timed. Only vertices are pushed, once each: where skin is hollow, or by a long edge, cloth may stay inside.
+timed.
 """
 
 from __future__ import annotations

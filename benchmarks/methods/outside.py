@@ -1,7 +1,7 @@
 """Methods from outside: stored roll-outs, and programs with their own environment.
 
-A program reads an exported scene and writes a roll-out. The harness does not time it; a time that it
-writes beside the positions is reported, and marked as declared.
+A program reads an exported scene and writes a roll-out. A time that it writes beside it is reported, and
+marked as declared.
 """
 
 from __future__ import annotations

@@ -123,7 +123,7 @@ def settled(cloth: Cloth, energies: tuple[Energy, ...], dressed: Dressed, frames
     """Simulate the cloth to rest on the body in the motion's first pose: positions (V,3) [m].
 
     Raises RuntimeError when the simulation of the approach did not stay finite, and ValueError for a
-    garment that crosses itself before it where that is not allowed.
+    garment that crosses itself where it may not.
     """
     body, garment, motion, betas = dressed.body, dressed.garment, dressed.motion, dressed.betas
     first = motion.poses[0]

@@ -1,8 +1,7 @@
 """Claims of the paper about its method, as data, and whether each claim holds in a run.
 
 Santesteban, Otaduy, Casas: SNUG, CVPR 2022. Claims marked primary are one family, the same in every run:
-their p-values are corrected by Holm for all of it, whether or not a run can test each. Those of all other
-claims, the exploratory ones, are not corrected.
+their p-values are corrected by Holm for all of it. Those of exploratory claims are not corrected.
 """
 
 from __future__ import annotations
