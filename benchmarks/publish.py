@@ -117,7 +117,7 @@ def keep(whole: Path, target: Path, show: Show) -> None:
 
     Raises ResultsError where a picture, film or network of `show` is not there.
     """
-    networks = [model_path(whole / "models", name, seed=0) for name in show.networks]
+    networks = [model_path(RunFolder(whole).models, name, seed=0) for name in show.networks]
     kept = [whole / name for name in KEPT] + [whole / "figures" / name for name in show.files]
     kept += [path for path in [whole / "frame_energies.csv"] if path.exists()]
     if missing := [path for path in (*kept, *networks) if not path.exists()]:

@@ -75,17 +75,13 @@ class Kind:
         """Unit of its loss."""
         return UNITS[self.targets]
 
-    def has_energies(self, recipe: Recipe) -> bool:
-        """Return whether a recipe has energies in the loss of this kind, alone or beside simulated vertices.
-
-        Raises RecipeError for a `physics_weight` where no steps are taken on simulated vertices.
-        """
+    def check(self, recipe: Recipe) -> None:
+        """Raise RecipeError for a `physics_weight` where no steps are taken on simulated vertices."""
         if recipe.physics_weight and (self.targets != "vertices" or self.fitted):
             raise RecipeError(
                 f"recipe option physics_weight={recipe.physics_weight}: {self.name} learns no simulated "
                 "vertices step by step; use 0"
             )
-        return self.physics or recipe.physics_weight > 0
 
 
 def _handles(count: int, cost: float) -> Kind:

@@ -183,7 +183,7 @@ _LABELS = {
     "detached-past": "inertia about a detached past",
     "two-transitions": "inertia of two transitions",
     "springs": "springs instead of StVK",
-    **{recipe.name: f"paper's text, no {recipe.name[9:]}" for recipe in PAPER_ABLATIONS},
+    **{recipe.name: recipe.name.replace("paper-no-", "paper's text, no ") for recipe in PAPER_ABLATIONS},
 }
 RECIPES = tuple(
     network(

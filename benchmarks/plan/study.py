@@ -53,7 +53,7 @@ class Part:
 
 @dataclass(frozen=True, kw_only=True)
 class Show:
-    """What is published of a run besides its rows, tables and PDF.
+    """Content that is published of a run besides its rows, tables and PDF.
 
     Attributes:
         networks: names of networks whose seed 0 is kept, in half precision.

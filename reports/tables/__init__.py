@@ -11,7 +11,6 @@ from pathlib import Path
 from reports.finished_run import Run
 from reports.tables.findings import (
     errors_in_spreads,
-    excess_by_time_step,
     extremes,
     findings,
     relative_excess,
@@ -28,7 +27,6 @@ TABLES: tuple[Callable[[Run], list[Table]], ...] = (
     overview,
     paper_tables,
     relative_excess,
-    excess_by_time_step,
     errors_in_spreads,
     findings,
     ablations,

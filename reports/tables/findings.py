@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Mapping
 from typing import Any
 
 import pandas as pd
@@ -24,11 +24,16 @@ from reports.statistics.relative_excess import (
 from reports.statistics.verdicts import OPEN, measure_of, standing, why_open
 from reports.tables.table import GARMENT, METHOD, SCENE, SUITE, Cell, Column, Table, table
 
+# The rule of verdicts (reports.statistics.verdicts) in a note.
+VERDICTS = (
+    "Tie: all of the interval within 5 % of equality, or the noise of the reference if that is wider, "
+    "against each time step. Decided: p < 0.05, beyond that noise, with one sign against each time step."
+)
 CLAIMS_NOTE = (
     "Effect: × the first over the second, of geometric means; of energies whose zero is a choice, points of "
     "relative excess between the two; of frames, the first's share less half. Below: the 95 % interval over "
     "motions and seeds (of points with the mean nearer to 0 held), of costs the range. p: of primary claims "
-    "by Holm for the whole family. The rule of verdicts is that of docs/statistics.md."
+    f"by Holm for the whole family. {VERDICTS} Costs are decided where their range lies on one side."
 )
 
 
@@ -63,16 +68,21 @@ def findings(run: Run) -> list[Table]:
 EXCESS_NOTE = (
     "Typical: mean over motions and seeds of arcsinh(x / 1 %), taken back: a geometric mean well above 1 %, "
     "arithmetic well below. Segments of a recording count as one motion. Uncertain by: the noise, of what "
-    "the start of the reference changes. The rule of verdicts is that of docs/statistics.md."
+    f"the start of the reference changes. {VERDICTS}"
 )
 
 
 def relative_excess(run: Run) -> list[Table]:
-    """Tabulate the relative excess of each method over the motions of a garment."""
+    """Tabulate the relative excess of each method over the motions of a garment, and by time step."""
+    zero = {*run.with_role("reference", "reference-variant"), SKINNING}
+    excesses: dict[tuple[str, str], Excess] = {}
     lines: list[tuple[Cell, ...]] = []
-    for garment, method, excess in _excesses(run):
-        rows = run.garment_rows[run.garment_rows["garment"] == garment]
-        lines.append((garment, method, own_excess_of(run, rows, method), *_cells_of(excess)))
+    for garment in run.garments(run.garment_rows):
+        rows = with_relative_excess(run, run.garment_rows[run.garment_rows["garment"] == garment])
+        for method in run.ordered(set(rows[rows["usable"]]["method"]) - zero):
+            if excess := excess_of(run, rows, method):
+                excesses[garment, method] = excess
+                lines.append((garment, method, own_excess_of(run, rows, method), *_cells_of(excess)))
     columns = (
         GARMENT, METHOD, Column("own", "In own energies", "%", digits=2),
         Column("typical", "Typical", "%", digits=2), Column("recorded", "Recorded", "%", digits=2),
@@ -86,21 +96,19 @@ def relative_excess(run: Run) -> list[Table]:
         "(geometric, with its interval) and mean: over independent sources and seeds. Recorded, others: "
         "typical of the library's recordings, and of other motions. Pooled: ratio of the sums over motions."
     )
-    return table("relative_excess", columns, lines, caption, grouped_by=("garment",), note=EXCESS_NOTE)
+    means = table("relative_excess", columns, lines, caption, grouped_by=("garment",), note=EXCESS_NOTE)
+    return [*means, *_by_time_step(run, excesses)]
 
 
-def excess_by_time_step(run: Run) -> list[Table]:
-    """Tabulate the typical relative excess against simulations with smaller time steps."""
+def _by_time_step(run: Run, excesses: Mapping[tuple[str, str], Excess]) -> list[Table]:
+    """Tabulate the typical relative excess, (garment, method) -> one, against each smaller time step."""
     members = [name for name in run.reference_family if name not in STARTS[1]]
     lines: list[tuple[Cell, ...]] = []
-    for garment, method, excess in _excesses(run):
-        against = excess.effect.against
-        moved = [
-            float(off_scale(excess.effect.value + against[name], EXCESS)) if name in against else None
-            for name in members
-        ]
-        if against:
-            lines.append((garment, method, excess.typical, *moved))
+    for key, excess in excesses.items():
+        value, against = excess.effect.value, excess.effect.against
+        moved = {name: float(off_scale(value + change, EXCESS)) for name, change in against.items()}
+        if moved:
+            lines.append((*key, excess.typical, *map(moved.get, members)))
     columns = (
         GARMENT, METHOD,
         *(Column(name, run.label(name), "%", digits=2) for name in (run.reference, *members)),
@@ -110,16 +118,6 @@ def excess_by_time_step(run: Run) -> list[Table]:
         "energy than that simulation."
     )
     return table("excess_by_time_step", columns, lines, caption, grouped_by=("garment",))
-
-
-def _excesses(run: Run) -> Iterator[tuple[str, str, Excess]]:
-    """Yield garment, method and relative excess of each method but references and skinning."""
-    zero = {*run.with_role("reference", "reference-variant"), SKINNING}
-    for garment in run.garments(run.garment_rows):
-        rows = with_relative_excess(run, run.garment_rows[run.garment_rows["garment"] == garment])
-        for method in run.ordered(set(rows[rows["usable"]]["method"]) - zero):
-            if excess := excess_of(run, rows, method):
-                yield garment, method, excess
 
 
 def _cells_of(excess: Excess) -> tuple[Cell, ...]:

@@ -30,11 +30,13 @@ MOTIONS = Column("motions", "Motions", text=True)
 
 def paper_tables(run: Run) -> list[Table]:
     """Make both tables by the paper's recipe, for page one, and by the default one."""
+    rows = run.garment_rows[run.garment_rows["usable"]]
+    means = rows.groupby(["method", "metric", "scene"], observed=True)["value"].mean()
     return [
-        *_energies(run, "paper_table_1", "pbns-paper", "snug-paper"),
-        *_curvature(run, "paper_table_2", "snug-paper"),
-        *_energies(run, "table_1", "pbns", "snug"),
-        *_curvature(run, "table_2", "snug"),
+        *_energies(run, means, "paper_table_1", "pbns-paper", "snug-paper"),
+        *_curvature(run, means, "paper_table_2", "snug-paper"),
+        *_energies(run, means, "table_1", "pbns", "snug"),
+        *_curvature(run, means, "table_2", "snug"),
     ]
 
 
@@ -51,21 +53,20 @@ def _samples(run: Run, methods: Sequence[str], metric: str) -> Mapping[str, pd.S
     return {name: part for name, part in samples.items() if len(part)}
 
 
-def _mean(run: Run, method: str, metric: str, frames: pd.Series) -> float | None:
-    """Return the mean of a metric over these frames and the seeds; None where a scene lacks it."""
-    rows = run.garment_rows[run.garment_rows["scene"].isin(frames.index) & run.garment_rows["usable"]]
-    kept = rows[(rows["method"] == method) & (rows["metric"] == metric)]
-    means = kept.groupby("scene", observed=True)["value"].mean()
-    known = len(means) == len(frames)
-    return float(np.average(means, weights=frames[means.index])) if known else None
+def _mean(means: pd.Series, method: str, metric: str, frames: pd.Series) -> float | None:
+    """Return the mean over these frames of (method, metric, scene) -> mean; None where a scene lacks it."""
+    known = means.get((method, metric))
+    if known is None or not frames.index.isin(known.index).all():
+        return None
+    return float(np.average(known[frames.index], weights=frames))
 
 
-def _energies(run: Run, name: str, pbns: str, snug: str) -> list[Table]:
+def _energies(run: Run, means: pd.Series, name: str, pbns: str, snug: str) -> list[Table]:
     """Tabulate energies. Gravity has no ratio: its zero is a choice, and the paper does not state its own."""
     lines: list[tuple[Cell, ...]] = []
     for motions, frames in _samples(run, (pbns, snug), "energy/strain").items():
         for term, printed in TABLE_1.items():
-            ours = [_mean(run, method, f"energy/{term}", frames) for method in (pbns, snug)]
+            ours = [_mean(means, method, f"energy/{term}", frames) for method in (pbns, snug)]
             ratios = [
                 two / one if one and two and term != "gravity" else None for one, two in (ours, printed)
             ]
@@ -85,7 +86,7 @@ def _energies(run: Run, name: str, pbns: str, snug: str) -> list[Table]:
     return table(name, columns, lines, caption, grouped_by=("motions",))
 
 
-def _curvature(run: Run, name: str, base: str) -> list[Table]:
+def _curvature(run: Run, means: pd.Series, name: str, base: str) -> list[Table]:
     """Tabulate curvature with the full loss and without each term.
 
     Below stand the other members of the reference's family, whose errors are a floor.
@@ -95,7 +96,7 @@ def _curvature(run: Run, name: str, base: str) -> list[Table]:
     lines: list[tuple[Cell, ...]] = []
     for motions, frames in _samples(run, tuple(variants.values()), CURVATURE[0]).items():
         values = {
-            method: [_mean(run, method, metric, frames) for metric in CURVATURE]
+            method: [_mean(means, method, metric, frames) for metric in CURVATURE]
             for method in (*variants.values(), *run.reference_family)
         }
         full = values[base][0]

@@ -143,27 +143,9 @@ def load_motions(path: str | Path, *, options: MotionFileOptions | None = None) 
     >>> motion.name, motion.frames, motion.fps
     ('standing', 31, 30.0)
     """
-    path, known, options = Path(path), ", ".join(READERS), options or MotionFileOptions()
-    if not path.exists():
-        raise MotionError(f"{path}: no such file or folder; give a motion file ({known}) or a folder")
-    files = [path]
-    if path.is_dir():
-        found = path.rglob("*") if options.split else path.iterdir()
-        listed = sorted(file for file in found if file.suffix.lower() in READERS)
-        files = [f for f in listed if not any(fnmatch(f.name, shape) for shape in SHAPE_FILES)]
-    names = {file: file.stem for file in files}
-    if options.split:
-        numbers = {file: CMU_FILE.fullmatch(name) for file, name in names.items()}
-        wanted = options.clips("train", "test")
-        names = {file: number[1] for file, number in numbers.items() if number and number[1] in wanted}
-    if not names:
-        what = f"file of a clip of split {options.split}" if options.split else "motion file"
-        raise MotionError(f"{path}: holds no {what} ({known}); give a folder of motion capture clips")
-    for name in names.values():
-        if len(same := [str(file) for file in names if names[file] == name]) > 1:
-            raise MotionError(f"{path}: {name} is in {' and '.join(same)}: leave one")
+    options = options or MotionFileOptions()
     motions = []
-    for file, name in names.items():
+    for name, file in _files_by_name(Path(path), options).items():
         try:
             motion = clear_arms(resample(place(read_motion(file, options))))
         except MotionError as error:
@@ -173,6 +155,32 @@ def load_motions(path: str | Path, *, options: MotionFileOptions | None = None) 
         else:
             motions.append(replace(motion, name=name))
     return motions
+
+
+def _files_by_name(path: Path, options: MotionFileOptions) -> dict[str, Path]:
+    """Return name -> file of the motions of a file or folder, as `load_motions` takes them."""
+    readable = ", ".join(READERS)
+    if not path.exists():
+        raise MotionError(f"{path}: no such file or folder; give a motion file ({readable}) or a folder")
+    files = [path]
+    if path.is_dir():
+        listed = path.rglob("*") if options.split else path.iterdir()
+        motion_files = sorted(file for file in listed if file.suffix.lower() in READERS)
+        files = [f for f in motion_files if not any(fnmatch(f.name, shape) for shape in SHAPE_FILES)]
+    wanted = options.clips("train", "test")
+    named: dict[str, Path] = {}
+    for file in files:
+        number = CMU_FILE.fullmatch(file.stem)
+        name = number[1] if options.split and number else file.stem
+        if options.split and name not in wanted:
+            continue
+        if name in named:
+            raise MotionError(f"{path}: {name} is in {named[name]} and {file}: leave one")
+        named[name] = file
+    if not named:
+        what = f"file of a clip of split {options.split}" if options.split else "motion file"
+        raise MotionError(f"{path}: holds no {what} ({readable}); give a folder of motion capture clips")
+    return named
 
 
 def read_motion(file: Path, options: MotionFileOptions) -> Motion:

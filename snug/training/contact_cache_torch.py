@@ -37,18 +37,14 @@ class TensorContactCache:
             for array in (patch.rest, patch.centroids, patch.sample_rest)
         )
         self.adjacency = torch.as_tensor(patch.adjacency, device=device).long()  # (Q, 3)
-        around = _incident(patch.faces)
+        around = incident(patch.faces)
         self.around = torch.as_tensor(around, device=device)  # (P, K) faces, -1 beyond the last
         self._walk, self.planes_at = compiled(self._walked, device), compiled(self._planes, device)
         self._closest = CudaGraph(self._searched_in_parts, device)
 
     def normals(self, positions: Tensor) -> Tensor:
         """Return area-weighted vertex normals (N, P, 3) of positions (N, P, 3), rounded to 1/127."""
-        a, b, c = (positions[:, self.corners[:, corner]] for corner in range(3))
-        of_faces = torch.linalg.cross(b - a, c - a)
-        # Gathered, not scattered: sums are then taken in one order on a GPU too.
-        present = (self.around >= 0)[..., None]
-        normals = (of_faces[:, self.around.clamp(min=0)] * present).sum(-2)
+        normals = normal_sums(positions, self.corners, self.around)
         return (
             127.0 * normals / (torch.linalg.vector_norm(normals, dim=-1, keepdim=True) + 1e-30)
         ).round()
@@ -194,7 +190,18 @@ def closest_on_triangle(s: Tensor, t: Tensor, r: Tensor) -> tuple[Tensor, Tensor
     return torch.where(inside, v, edge_v), torch.where(inside, w, edge_w)
 
 
-def _incident(faces: np.ndarray) -> np.ndarray:
+def normal_sums(positions: Tensor, corners: Tensor, around: Tensor) -> Tensor:
+    """Return the sums of the normals, twice the area long, of the faces around each vertex, (N, P, 3) [m^2].
+
+    positions: (N, P, 3) [m]. corners: (Q, 3) of the faces. around: (P, K) of `incident`.
+    """
+    a, b, c = (positions[:, corners[:, corner]] for corner in range(3))
+    of_faces = torch.linalg.cross(b - a, c - a)
+    # Gathered, not scattered: sums are then taken in one order on a GPU too.
+    return (of_faces[:, around.clamp(min=0)] * (around >= 0)[..., None]).sum(-2)
+
+
+def incident(faces: np.ndarray) -> np.ndarray:
     """Return the faces around each vertex, ascending: (Q, 3) -> (P, K) int64, rows filled up with -1."""
     starts, around = faces_around(faces, int(faces.max()) + 1)
     counts = np.diff(starts)

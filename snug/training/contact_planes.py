@@ -19,7 +19,13 @@ from reference_sim.energies import ContactPenalty
 from snug.body.skinning import add_pose_correctives, skin
 from snug.kernels.skinning import FastSkin
 from snug.training.contact_cache import ContactCache, Patch
-from snug.training.contact_cache_torch import Anchors, TensorContactCache, first_places
+from snug.training.contact_cache_torch import (
+    Anchors,
+    TensorContactCache,
+    first_places,
+    incident,
+    normal_sums,
+)
 from snug.training.device import compiled
 from snug.training.physics_loss import Planes
 from snug.training.training_set import Batch, TrainingSet
@@ -136,7 +142,10 @@ class NearestVertices:
 
     def __init__(self, data: TrainingSet) -> None:
         body = data.dressed.body
-        self.faces = torch.as_tensor(body.faces, device=data.device).long()
+        self.faces, self.around = (
+            torch.as_tensor(array, device=data.device).long()
+            for array in (body.faces, incident(body.faces))
+        )
         vertices = np.arange(len(body.template))
         self.bodies = BodyPatches(data, vertices, self._normals, kernels=False, kept=False)
 
@@ -156,10 +165,7 @@ class NearestVertices:
         return points, normals
 
     def _normals(self, positions: Tensor) -> Tensor:
-        a, b, c = (positions[:, self.faces[:, corner]] for corner in range(3))
-        of_corners = torch.linalg.cross(b - a, c - a).repeat_interleave(3, dim=1)
-        sums = torch.zeros_like(positions).index_add(1, self.faces.flatten(), of_corners)
-        return torch.nn.functional.normalize(sums, dim=-1)
+        return torch.nn.functional.normalize(normal_sums(positions, self.faces, self.around), dim=-1)
 
 
 # Frames searched after a step, as a share of the batch's, at most one of each window.

@@ -6,7 +6,7 @@ snug.training.train_network repeats it.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -100,7 +100,8 @@ class Trainer:
         self.contact: TrainingContact | None = None
         self.nearest: NearestVertices | None = None  # in place of anchors
         self.targets: VertexTargets | None = None
-        if how.has_energies(recipe):
+        how.check(recipe)
+        if how.physics or recipe.physics_weight:
             self.loss = PhysicsLoss(
                 dressed.cloth, recipe, dt=self.data.dt, device=device, kernels=self.kernels
             )
@@ -152,7 +153,11 @@ class Trainer:
             betas = self.random.uniform(-1, 1, (len(windows), shapes)) * self.recipe.shape_range
         state = self.start_state(self.data.frames_of(windows))
         means = self.learn(number, windows, betas, state)
-        return {"loss": sum(self.factors.get(name, 1.0) * mean for name, mean in means.items()), **means}
+        return {"loss": sum(self.weighed(means).values()), **means}
+
+    def weighed(self, terms: Mapping[str, Any]) -> dict[str, Any]:
+        """Return numbers or tensors of terms as they stand in the loss: name -> factor times term."""
+        return {name: self.factors.get(name, 1.0) * term for name, term in terms.items()}
 
     def learn(
         self, number: int, windows: np.ndarray, betas: np.ndarray | None, state: Tensor | None
@@ -243,7 +248,8 @@ class Trainer:
         """
         stacked = torch.stack(list(terms.values()), 1)  # (N, terms, T)
         means = dict(zip(terms, stacked.detach().mean((0, 2)).tolist()))
-        stacked = stacked * stacked.new_tensor([[self.factors.get(name, 1.0)] for name in terms])
+        if self.factors:
+            stacked = torch.stack(list(self.weighed(terms).values()), 1)
         joules = stacked.detach().sum(1).mean(1).cpu().numpy()
         verdict = self.guard.judge(number, joules, self.namer(windows))
         if verdict == "leave out":

@@ -241,7 +241,7 @@ def _fitted_model(
     """Fit a network to the offsets of simulated frames; its loss is that of the posed vertices."""
     begun = time.perf_counter()
     kind = find_kind(model_kind)
-    kind.has_energies(recipe)  # refuses a weight for them
+    kind.check(recipe)
     data = TrainingSet(dressed, motions, recipe, features=kind.network.feature_set, sequences=False)
     vertices = relative_vertices(dressed, motions, trajectories)
     weights = dressed.weights(recipe.smoothing)

@@ -77,9 +77,8 @@ class Validator:
             rows = np.arange(first, end).reshape(
                 (1, -1) if self.trainer.how.network.sequential else (-1, 1)
             )
-            terms = self._terms(self.data.at(rows))
-            weighed = [self.trainer.factors.get(name, 1.0) * term for name, term in terms.items()]
-            total += float(torch.stack(weighed).sum())
+            terms = self.trainer.weighed(self._terms(self.data.at(rows)))
+            total += float(torch.stack(list(terms.values())).sum())
         return total / self.data.frames
 
     def _terms(self, batch: Batch) -> dict[str, Tensor]:

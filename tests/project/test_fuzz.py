@@ -175,6 +175,7 @@ def test_mutated_files_are_refused_in_one_line_that_names_them(name, count, tmp_
             refused += 1
             line = str(error)
             assert path.stem in line and "\n" not in line and len(line) < 1000, (number, line)
+            assert type(error).__module__.startswith(("reference_sim", "snug", "benchmarks")), number
         assert time.process_time() - clock < 10.0, number
     assert refused > count / 3 and peak_memory() < before + 1000.0
 

@@ -66,7 +66,7 @@ def edge_counts(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def volume(vertices: np.ndarray, faces: np.ndarray) -> float:
-    """Of a closed mesh [m^3], positive where faces are wound outwards."""
+    """Volume of a closed mesh [m^3], positive where faces are wound outwards."""
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6.0)
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from reports.statistics.relative_excess import RELATIVE_EXCESS, with_relative_excess
-from reports.tables.findings import excess_by_time_step, relative_excess
+from reports.tables.findings import relative_excess
 from tests.reports.report_folder import row, run_of
 
 ENSEMBLE = "simulation-perturbed-1e-4"
@@ -66,7 +66,7 @@ def test_a_method_with_less_energy_than_a_finer_simulation_is_below_zero_against
     rows = [
         row(f"tshirt/{clip}", name, "energy/total", x) for name, x in energies.items() for clip in "ab"
     ]
-    (made,) = excess_by_time_step(run_of(rows))
+    _, made = relative_excess(run_of(rows))
     assert [column.name for column in made.columns[2:]] == ["simulation", "simulation-dt/4"]
     shown = {method: numbers for _, method, *numbers in made.rows}
     assert shown == {
