@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import dataclasses
 import json
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -108,6 +111,52 @@ def test_skinning_made_elsewhere_and_scored_gives_the_numbers_of_the_method(home
     less = rows_of_file(positions=inside)
     assert {name.partition("/")[0] for name in expected.keys() - less.keys()} <= {"dynamics"}
     assert "dynamics/quasi_static_difference" not in less and less.items() <= expected.items()
+
+
+TENSORFLOW = """
+from types import SimpleNamespace
+
+import numpy as np
+
+float32 = np.float32
+cast = np.asarray
+zeros = np.zeros
+SHAPES = [(1, 1, 72), (1, 1, 3), (1, 1, 10), *[(1, 256)] * 4, (1, 1, 3), BODY, (1, 24, 4, 4), BODY, BODY]
+
+
+def load(path):
+    cloth = np.load(path + "/cloth.npz")
+
+    def network(inputs):
+        assert [array.shape for array in inputs] == SHAPES
+        assert {str(array.dtype) for array in inputs} == {"float32"}
+        assert np.allclose(np.linalg.norm(inputs[11], axis=2), 1.0, atol=1e-5)
+        matrices = np.einsum("vj,jab->vab", cloth["weights"], inputs[9][0])
+        skinned = np.einsum("vab,vb->va", matrices[:, :3, :3], cloth["rest"]) + matrices[:, :3, 3]
+        moving = 0.001 * inputs[3][0, 0] * inputs[1][0]
+        return (skinned + inputs[7][0] + moving)[None], [state + 1 for state in inputs[3:7]]
+
+    return network
+
+
+saved_model = SimpleNamespace(load=load)
+"""
+
+
+def test_the_authors_network_is_given_what_it_reads_in_its_order(home, tmp_path):
+    folder, _ = home
+    given, motion = arrays(folder / "skinning.npz"), arrays(folder / "motion_smpl.npz")
+    body = (1, *arrays(folder / "obstacle.npz")["positions"].shape[1:])
+    (tmp_path / "tensorflow.py").write_text(TENSORFLOW.replace("BODY", str(body)))
+    np.savez(tmp_path / "cloth.npz", weights=given["smoothed_weights"], rest=given["rest_positions"])
+    script = Path(__file__).parents[3] / "docs" / "examples" / "authors_snug.py"
+    command = [sys.executable, str(script), str(tmp_path), str(folder), str(tmp_path / "out.npz")]
+    subprocess.run(command, check=True, env=os.environ | {"PYTHONPATH": str(tmp_path)})
+    written = arrays(tmp_path / "out.npz")
+    velocities = np.diff(motion["trans"], axis=0, prepend=motion["trans"][:1]) * written["fps"]
+    moving = 0.001 * np.arange(len(velocities))[:, None, None] * velocities[:, None]
+    expected = skinned_elsewhere(folder, "motion_smpl.npz", np.eye(3)) + moving
+    assert np.abs(written["positions"] - expected).max() < 1e-5
 
 
 def test_the_motion_as_amass_has_it_is_the_same_motion(home):
