@@ -25,7 +25,7 @@ from benchmarks.declarations import DeclarationError
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = (  # those that compute, or read what is computed with
     "numpy", "scipy", "numba", "llvmlite", "torch", "h5py", "scikit-fem", "libigl", "cvxopt", "pymetis",
-    "ipctk", "pyvista", "pyacvd", "meshio", "pandas", "safetensors",
+    "ipctk", "pyvista", "pyacvd", "pandas", "safetensors",
 )  # fmt: skip
 
 

@@ -1,17 +1,12 @@
 """Mesh files of other programs: one mesh or a sequence, in metres with y up, and the pattern in a UV chart.
 
-OBJ is read here, since meshio refuses the texture coordinates of a garment with seams; PLY, STL and OFF
-are read by meshio.
-
 A chart is kept by the faces' corners. In space the pieces of the pattern are one mesh: vertices that a
 program has doubled for the sake of its chart are joined.
 """
 
 from __future__ import annotations
 
-import contextlib
 import glob
-import io
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -21,18 +16,13 @@ from typing import Any
 import numpy as np
 
 from reference_sim.cloth import MeshError
+from reference_sim.files.mesh_formats import READERS, read_contents
 from reference_sim.geometry.topology import corner_areas
 
-MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off")
-# What a header has that ends; meshio looks for it for ever.
-HEADERS = {".ply": rb"^\s*end_header\s*$", ".off": rb"^\s*\d+\s+\d+\s+\d+\s*$"}
+MESH_SUFFIXES = tuple(READERS)
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 UP_AXES = ("y", "z")
 LARGEST_COORDINATE = 1e12  # in any unit: squares and cubes of it are still numbers
-UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))  # of a vertex, as programs call them
-# Points, polygons, texture coordinates, and places in these parallel to polygons, -1 for a corner
-# without.
-Contents = tuple[Any, Sequence[Any], Any, Sequence[Any]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,67 +48,11 @@ def read_mesh(path: str | Path) -> Surface:
         raise MeshError(f"{path}: no such file")
     if path.suffix.lower() not in MESH_SUFFIXES:
         raise MeshError(f"{path}: unknown kind of mesh: convert it to one of {', '.join(MESH_SUFFIXES)}")
-    return _surface(path, *(_read_obj if path.suffix.lower() == ".obj" else _read_with_meshio)(path))
-
-
-def _read_obj(path: Path) -> Contents:
-    points: list[list[float]] = []
-    polygons: list[list[int]] = []
-    uv: list[list[float]] = []
-    uv_polygons: list[list[int]] = []
-    with open(path, encoding="utf-8", errors="replace") as file:
-        for number, line in enumerate(file, start=1):
-            kind, *fields = line.partition("#")[0].split() or [""]
-            try:
-                if kind == "v":
-                    x, y, z = fields[:3]  # colours may follow
-                    points.append([float(x), float(y), float(z)])
-                elif kind == "vt":
-                    uv.append([float(fields[0]), float(fields[1]) if len(fields) > 1 else 0.0])
-                elif kind == "f":
-                    corners = [[*word.split("/"), ""] for word in fields]
-                    polygons.append([_counted(c[0], len(points)) for c in corners])
-                    uv_polygons.append([_counted(c[1], len(uv)) if c[1] else -1 for c in corners])
-            except (ValueError, IndexError):
-                raise MeshError(
-                    f"{path}: line {number} is not understood: {line.strip()[:60]!r}"
-                ) from None
-    return points, polygons, uv, uv_polygons
-
-
-def _counted(text: str, count: int) -> int:
-    """Return an index from 0 on: OBJ counts from 1, and from the last by -1. Raises ValueError."""
-    number = int(text)
-    if not 0 < abs(number) < 1 << 62:
-        raise ValueError(text)
-    return number - 1 if number > 0 else count + number
-
-
-def _read_with_meshio(path: Path) -> Contents:
-    import meshio
-
-    printed = io.StringIO()
     try:
-        pattern = HEADERS.get(path.suffix.lower())
-        if pattern and not re.search(pattern, path.read_bytes(), re.MULTILINE):
-            raise ValueError("its header does not end")
-        # meshio prints its error and then leaves the interpreter; its STL reader overflows on purpose.
-        with (
-            contextlib.redirect_stdout(printed),
-            contextlib.redirect_stderr(printed),
-            np.errstate(over="ignore"),
-        ):
-            mesh = meshio.read(path)
-    except (Exception, SystemExit) as error:
-        message = printed.getvalue().strip() if isinstance(error, SystemExit) else str(error)
-        reason = " ".join(message.split())[:300] or type(error).__name__
-        raise MeshError(f"{path}: cannot be read ({reason}): export it again, as OBJ") from None
-    kinds = [block for block in mesh.cells if block.type.startswith(("triangle", "quad", "polygon"))]
-    polygons, data = [polygon for block in kinds for polygon in block.data], mesh.point_data
-    for u, v in UV_NAMES:
-        if u in data and v in data:
-            return mesh.points, polygons, np.stack([data[u], data[v]], axis=1), polygons
-    return mesh.points, polygons, (), ()
+        contents = read_contents(path)
+    except ValueError as error:
+        raise MeshError(f"{path}: {error}") from None
+    return _surface(path, *contents)
 
 
 def _surface(
@@ -126,7 +60,7 @@ def _surface(
 ) -> Surface:
     """Check the contents of a file, and cut its quads into triangles."""
     positions, uv = np.asarray(points, dtype=np.float64), np.asarray(uv, dtype=np.float64)
-    if not polygons:
+    if not len(polygons):
         raise MeshError(f"{path}: no triangles in it: export the surface as triangles")
     if positions.ndim != 2 or positions.shape[1] != 3:
         raise MeshError(f"{path}: vertices have shape {positions.shape}: expected three coordinates each")

@@ -66,12 +66,60 @@ def test_texture_coordinates_of_vertices_are_those_of_their_corners(tmp_path):
     np.testing.assert_allclose(surface.uv, uv[faces], atol=1e-6)
 
 
+SQUARE = "0 0 0\n1 0 0\n1 1 0\n0 1 0\n"
+COLOURED = SQUARE.replace("\n", " 255 0 0 255\n")
+PLY = (
+    "ply\nformat {} 1.0\ncomment a\nelement vertex 4\nproperty float x\nproperty float y\nproperty float z\n"
+    "element face {}\nproperty list uchar int vertex_index\nproperty list uchar float texcoord\nend_header\n"
+)
+WEDGES = "3 0 1 2 6 0 0 1 0 1 1 3 0 2 3 0\n"  # the second triangle has no texture coordinates
+BINARY = np.array(SQUARE.split(), "<f4").tobytes() + b"".join(
+    b"\3" + np.array(face, "<i4").tobytes() + bytes([len(uv)]) + np.array(uv, "<f4").tobytes()
+    for face, uv in (((0, 1, 2), (0, 0, 1, 0, 1, 1)), ((0, 2, 3), ()))
+)
+
+
+@pytest.mark.parametrize(
+    ("name", "content"),
+    [
+        ("a.off", f"OFF\n4 2 0\n{SQUARE}3 0 1 2\n3 0 2 3\n"),
+        ("a.off", f"\ufeffOFF\r\n4 2 0\n{SQUARE}3 0 1 2 255 0 0\n3 0 2 3\n"),
+        ("a.off", f"# by\n\nCOFF # a\n\n4 2 0\n{COLOURED}# b\n3 0 1 2\n3 0 2 3\n"),
+        ("a.off", f"OFF 4 2 0\n{SQUARE}4 0 1 2 3\n".replace(" 2 0", " 1 0", 1)),
+        ("a.off", f"STCNOFF4 2\n{COLOURED}3 0 1 2\n3 0 2 3\n"),
+        ("a.ply", PLY.format("ascii", 2) + SQUARE + WEDGES),
+        ("a.ply", PLY.format("binary_little_endian", 2).encode() + BINARY),
+        ("a.obj", "\ufeffv " + "\nv ".join(SQUARE.split("\n")[:4]) + "\nf 1 2 3 4\n"),
+    ],
+)
+def test_each_variant_of_a_format_is_the_same_square(tmp_path, name, content):
+    path = tmp_path / name
+    path.write_bytes(content if isinstance(content, bytes) else content.encode())
+    surface = read_mesh(path)
+    assert surface.positions.tolist() == [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    assert surface.faces.tolist() == [[0, 1, 2], [0, 2, 3]]
+    if name == "a.ply":
+        assert surface.uv[0].tolist() == [[0, 0], [1, 0], [1, 1]] and np.isnan(surface.uv[1]).all()
+
+
 @pytest.mark.parametrize(
     ("name", "text", "message"),
     [
         ("a.obj", None, "no such file"),
         ("a.fbx", "x", "unknown kind of mesh: convert it to one of .obj"),
         ("a.ply", "rubbish\n", "its header does not end"),
+        ("a.ply", PLY.format("ascii", 10**18) + SQUARE + WEDGES, "ends before what its header states"),
+        ("a.ply", PLY.format("ascii", 1) + SQUARE + WEDGES, "more numbers than its header states"),
+        ("a.ply", PLY.format("ascii", 1) + SQUARE + "4000000000 0 1 2", "cannot be read"),
+        (
+            "a.ply",
+            PLY.format("ascii", 1) + SQUARE + "3 0 1.5 2 0",
+            "a number of vertex_index is not whole",
+        ),
+        ("a.off", f"OFF\n{10**12} 1 0\n{SQUARE}", "ends with 4 vertices and 0 faces"),
+        ("a.off", f"OFF\n4 1 0\n{SQUARE}999999999 0 1 2\n", "line 7 is not understood"),
+        ("a.off", f"4OFF\n4 1 0\n{SQUARE}3 0 1 2\n", "does not begin with OFF"),
+        ("a.stl", "v" * 200, "is no whole STL"),
         ("a.obj", "# a mesh\nv 0 0 zero\n", "line 2 is not understood: 'v 0 0 zero'"),
         ("a.obj", "v 0 0 0\nv 1 0 0\n", "no triangles in it"),
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1e300 0\nf 1 2 3\n", "vertex 2 is not finite, or farther than"),

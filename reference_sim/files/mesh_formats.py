@@ -1,0 +1,230 @@
+"""Contents of OBJ, PLY, OFF and STL files: points, polygons and texture coordinates, as they stand there.
+
+The libraries at hand do not: meshio refuses texture coordinates of corners and most variants of OFF, VTK
+keeps PLY in single precision, libigl drops texture coordinates.
+
+Nothing is allocated by a number that a file states, which may be more than its bytes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))  # of a vertex, as programs call them
+PLY_NUMBERS = {
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
+    "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4",
+    "uint32": "u4", "int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8",
+}  # fmt: skip
+PLY_ORDER = {"ascii": "text", "binary_little_endian": "<", "binary_big_endian": ">"}
+# Points, polygons, texture coordinates, and places in these parallel to polygons, -1 for a corner
+# without.
+Contents = tuple[Any, Sequence[Any], Any, Sequence[Any]]
+
+
+def read_contents(path: Path) -> Contents:
+    """Read a file by its ending, which READERS has. Raises ValueError, without the file's name."""
+    try:
+        with np.errstate(all="ignore"):  # numbers that are not finite are refused with their vertex
+            return READERS[path.suffix.lower()](path)
+    except (ValueError, KeyError, OverflowError) as error:
+        reason = " ".join(str(error).split())[:200]
+        raise ValueError(f"cannot be read ({reason}): export it again, as OBJ") from None
+
+
+def _read_obj(path: Path) -> Contents:
+    points: list[list[float]] = []
+    polygons: list[list[int]] = []
+    uv: list[list[float]] = []
+    uv_polygons: list[list[int]] = []
+    with open(path, encoding="utf-8-sig", errors="replace") as file:
+        for number, line in enumerate(file, start=1):
+            kind, *fields = line.partition("#")[0].split() or [""]
+            try:
+                if kind == "v":
+                    x, y, z = fields[:3]  # colours may follow
+                    points.append([float(x), float(y), float(z)])
+                elif kind == "vt":
+                    uv.append([float(fields[0]), float(fields[1]) if len(fields) > 1 else 0.0])
+                elif kind == "f":
+                    corners = [[*word.split("/"), ""] for word in fields]
+                    polygons.append([_counted(c[0], len(points)) for c in corners])
+                    uv_polygons.append([_counted(c[1], len(uv)) if c[1] else -1 for c in corners])
+            except (ValueError, IndexError):
+                raise _not_understood(number, line) from None
+    return points, polygons, uv, uv_polygons
+
+
+def _counted(text: str, count: int) -> int:
+    """Return an index from 0 on: OBJ counts from 1, and from the last by -1. Raises ValueError."""
+    number = _index(text)
+    if number == 0:
+        raise ValueError(text)
+    return number - 1 if number > 0 else count + number
+
+
+def _index(text: str) -> int:
+    """Return a whole number that an array can hold. Raises ValueError."""
+    number = int(text)
+    if abs(number) >= 1 << 62:
+        raise ValueError(text)
+    return number
+
+
+def _not_understood(number: int, line: str) -> ValueError:
+    return ValueError(f"line {number} is not understood: {line.strip()[:60]!r}")
+
+
+def _read_off(path: Path) -> Contents:
+    """Read OFF with its variants: C, N or ST before the word, counts beside it, comments, colours."""
+    text = path.read_text(encoding="utf-8-sig", errors="replace")
+    head = re.match(r"(?:\s*#.*\n)*\s*(?:ST)?C?N?OFF", text)
+    if head is None:
+        raise ValueError("does not begin with OFF")
+    counts: list[int] = []
+    points: list[list[float]] = []
+    polygons: list[list[int]] = []
+    lines = text[head.end() :].split("\n")
+    for number, line in enumerate(lines, start=1 + text.count("\n", 0, head.end())):
+        fields = line.partition("#")[0].split()
+        try:
+            if not fields:
+                continue
+            if not counts:
+                counts = [int(fields[0]), int(fields[1])]
+            elif len(points) < counts[0]:
+                x, y, z = fields[:3]
+                points.append([float(x), float(y), float(z)])
+            elif len(polygons) < counts[1]:
+                polygons.append([_index(fields[1 + k]) for k in range(int(fields[0]))])
+        except (ValueError, IndexError):
+            raise _not_understood(number, line) from None
+    if [len(points), len(polygons)] != counts:
+        raise ValueError(
+            f"ends with {len(points)} vertices and {len(polygons)} faces, and states {counts}"
+        )
+    return points, polygons, (), ()
+
+
+def _read_stl(path: Path) -> Contents:
+    """Read STL: a triangle is three points, and points at one place are one."""
+    data = path.read_bytes()
+    count = int.from_bytes(data[80:84], "little")
+    if len(data) == 84 + 50 * count:
+        record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", 9), ("attribute", "<u2")])
+        corners = np.frombuffer(data, record, count, 84)["corners"].reshape(-1, 3)
+    elif not data.lstrip().startswith(b"solid"):
+        raise ValueError(f"is no whole STL ({count} triangles stated)")
+    else:
+        words = re.findall(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", data)
+        corners = np.array([list(map(float, point)) for point in words]).reshape(-1, 3)
+    _, first, places = np.unique(corners, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(first)  # of their first use
+    return corners[first[order]], list(np.argsort(order)[places].reshape(-1, 3)), (), ()
+
+
+def _read_ply(path: Path) -> Contents:
+    """Read PLY, text or binary, with whatever further elements, properties and lists it has."""
+    data = path.read_bytes()
+    head = re.match(rb"ply\s[\s\S]{1,65536}?\bend_header[ \t]*\r?\n", data)
+    if head is None:
+        raise ValueError("its header does not end")
+    order, at = "text", head.end()
+    elements: list[tuple[str, int, dict[str, list[str]]]] = []  # name, count, types of properties
+    for line in head.group().decode("utf-8", "replace").splitlines()[1:]:
+        match line.split():
+            case ["format", kind, _] if kind in PLY_ORDER:
+                order = PLY_ORDER[kind]
+            case ["element", name, count]:
+                elements.append((name, int(count), {}))
+            case ["property", "list", size, kind, name] if elements and name not in elements[-1][2]:
+                elements[-1][2][name] = [PLY_NUMBERS[kind], PLY_NUMBERS[size]]
+            case ["property", kind, name] if elements and name not in elements[-1][2]:
+                elements[-1][2][name] = [PLY_NUMBERS[kind]]
+            case ["comment" | "obj_info" | "end_header", *_] | []:
+                pass
+            case _:
+                raise ValueError(f"its header is not understood: {line.strip()[:60]!r}")
+    if order == "text":  # becomes a row of doubles
+        data, at = np.fromiter(map(float, data[at:].split()), np.float64).tobytes(), 0
+    contents: dict[str, dict[str, Any]] = {}
+    for name, number, properties in elements:
+        contents[name], at = _read_records(data, at, number, properties, order)
+    if order == "text" and at < len(data):
+        raise ValueError("has more numbers than its header states")
+    vertex: dict[str, Any]
+    face: dict[str, Any]
+    vertex, face = (
+        {name: values for name, values in contents.get(of, {}).items() if isinstance(values, kind)}
+        for of, kind in (("vertex", np.ndarray), ("face", list))
+    )
+    points = np.stack([vertex[axis] for axis in "xyz"], axis=1)
+    polygons: Any = face.get("vertex_indices", face.get("vertex_index", ()))
+    if any(map(len, corners := face.get("texcoord", ()))):  # u0 v0 u1 v1 ... of each face
+        uv = np.concatenate([[], *corners]).reshape(-1, 2)
+        ends = np.cumsum([len(numbers) // 2 for numbers in corners])
+        places = [
+            range(end - len(polygon), end) if len(numbers) == 2 * len(polygon) else [-1] * len(polygon)
+            for polygon, numbers, end in zip(polygons, corners, ends)
+        ]
+        return points, polygons, uv, places
+    for u, v in UV_NAMES:
+        if u in vertex and v in vertex:
+            return points, polygons, np.stack([vertex[u], vertex[v]], axis=1), polygons
+    return points, polygons, (), ()
+
+
+def _read_records(
+    data: bytes, at: int, count: int, properties: dict[str, list[str]], order: str
+) -> tuple[dict[str, Any], int]:
+    """Return arrays of numbers and lists of lists by property, and the place behind `count` records.
+
+    Records whose lists are as long as those of the first one left are read at once.
+    """
+    blocks: dict[str, list[np.ndarray]] = {name: [] for name in properties}
+    at_once = count
+    while count > 0 and properties:
+        if at >= len(data):
+            raise ValueError("ends before what its header states")
+        fields: list[Any] = []
+        for name, kinds in properties.items():
+            kind, *size = ["<f8"] * len(kinds) if order == "text" else [order + kind for kind in kinds]
+            if size:
+                length = np.frombuffer(data, size[0], 1, at + np.dtype(fields).itemsize)[0]
+                if length != int(length):
+                    raise ValueError(f"a list of {name} has {length} numbers")
+                fields += [(f"size of {name}", *size), (name, kind, (int(length),))]
+            else:
+                fields.append((name, kind))
+        record = np.dtype(fields)
+        fitting = min(count, at_once, (len(data) - at) // record.itemsize)
+        if not fitting:
+            raise ValueError("ends within a record that its header states")
+        records = np.frombuffer(data, record, fitting, at)
+        sizes = [records[name] for name in record.names or () if name not in properties]
+        other = np.any([size != size[0] for size in sizes], axis=0) if sizes else np.zeros(1, dtype=bool)
+        alike = int(np.argmax(other)) or fitting
+        for name, (kind, *_) in properties.items():
+            numbers = records[name][:alike]
+            typed = numbers.astype(kind)
+            if kind[0] != "f" and (typed != numbers).any():
+                raise ValueError(f"a number of {name} is not whole")
+            blocks[name].append(typed)
+        at, count, at_once = at + alike * record.itemsize, count - alike, 2 * alike
+    values = {
+        name: [row for block in blocks[name] for row in block.tolist()]
+        if len(kinds) > 1
+        else np.concatenate([np.empty(0), *blocks[name]])
+        for name, kinds in properties.items()
+    }
+    return values, at
+
+
+READERS: dict[str, Callable[[Path], Contents]] = {
+    ".obj": _read_obj, ".ply": _read_ply, ".stl": _read_stl, ".off": _read_off,
+}  # fmt: skip
