@@ -6,7 +6,7 @@
 | `.vtkhdf`, `.hdf` | a trajectory of this project |
 | `.pkl` | `pred`, `cloth_faces`, `obstacle`, `obstacle_faces`, as HOOD and ContourCraft write them |
 | `.pc2`, `.pc16` | point cache, as Neural Cloth Simulation writes it; faces of the `.obj` of the same name |
-| folder, pattern | one mesh a frame (`.obj`, `.ply` and others), in the order of the numbers in their names |
+| folder, pattern | one mesh a frame (`.obj`, `.ply` and others), by their evenly spaced numbers |
 
 Nothing is executed. A roll-out that does not fit its scene, in unit, axes, order of vertices, frame rate
 or place, is refused with the remedy.

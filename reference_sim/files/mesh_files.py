@@ -10,7 +10,9 @@ import glob
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
+from statistics import mode
 from typing import Any
 
 import numpy as np
@@ -92,10 +94,10 @@ def read_sequence(pattern: str | Path) -> tuple[np.ndarray, Surface]:
     """Read a moving mesh: positions (T, B, 3) and, for its faces, the first mesh.
 
     pattern: one mesh (T = 1), a folder of meshes of one kind, or a glob such as "body_*.obj", taken in
-    the order of the numbers in their names.
+    the order of the numbers in their names, which are evenly spaced.
 
-    Raises MeshError as `read_mesh`, for no files, and for vertices or faces other than those of the
-    first.
+    Raises MeshError as `read_mesh`, for no files, for names between which a number is missing, and for
+    vertices or faces other than those of the first.
     """
     paths = _paths(str(pattern))
     first = read_mesh(paths[0])
@@ -114,10 +116,11 @@ def read_sequence(pattern: str | Path) -> tuple[np.ndarray, Surface]:
 
 
 def _paths(pattern: str) -> list[Path]:
-    """Return the files that `read_sequence` reads. Raises MeshError for none, or several kinds."""
+    """Return the files that `read_sequence` reads. Raises MeshError for none, several kinds, or a gap."""
     path = Path(pattern)
     if path.is_dir():
-        paths = [p for p in path.iterdir() if p.suffix.lower() in MESH_SUFFIXES]
+        # macOS leaves a ._body_1.obj beside body_1.obj on other disks
+        paths = [p for p in path.iterdir() if p.suffix.lower() in MESH_SUFFIXES and p.name[0] != "."]
     elif path.exists() or not glob.has_magic(pattern):
         paths = [path]
     else:
@@ -126,7 +129,34 @@ def _paths(pattern: str) -> list[Path]:
     if len(kinds) != 1:
         held = f"meshes of several kinds ({', '.join(kinds)})" if kinds else "no mesh"
         raise MeshError(f"{pattern}: {held}: quote a pattern of one kind, as 'body_*.ply'")
-    return sorted(paths, key=lambda p: [int(s) if s.isdigit() else s for s in re.split(r"(\d+)", str(p))])
+    return _in_order(paths)
+
+
+def _in_order(paths: list[Path]) -> list[Path]:
+    """Return frames in the order of the one number in which their names differ.
+
+    Raises MeshError where they differ in something else, or where a number is missing or there twice.
+    """
+    parts = {path: re.split(r"([0-9]+)", str(path)) for path in paths}
+    varying = [k for k, words in enumerate(zip(*parts.values())) if len(set(words)) > 1]
+    alike = len({len(words) for words in parts.values()}) == 1
+    if len(paths) > 1 and not (alike and len(varying) == 1 and varying[0] % 2):
+        first, last = min(paths), max(paths)
+        raise MeshError(
+            f"{first}: differs from {last.name} in more than a number: name the frames of a sequence "
+            "alike but for their numbers, and leave other meshes out of the folder"
+        )
+    number = {path: int(words[varying[0]]) if varying else 0 for path, words in parts.items()}
+    frames = sorted(paths, key=number.__getitem__)
+    steps = [number[after] - number[path] for path, after in pairwise(frames)]
+    usual = mode(steps) if steps else 0
+    for path, after, step in zip(frames, frames[1:], steps):
+        if step != usual:
+            raise MeshError(
+                f"{after}: its number is {step} above that of {path.name}, and others follow by {usual}: "
+                "add the frames that are missing, or number the files evenly"
+            )
+    return frames
 
 
 def to_metres_y_up(positions: np.ndarray, *, units: str = "m", up: str = "y") -> np.ndarray:

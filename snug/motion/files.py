@@ -119,7 +119,8 @@ HANDS = [JOINT[f"{side}_{joint}"] for side in ("left", "right") for joint in ("w
 # Of a motion: rows of CSV files and lists in options hold it.
 NAME = re.compile(r"\w[\w.+()-]*( [\w.+()-]+)*")
 MAX_NAME_BYTES = 100
-SHAPE_FILES = ("shape.npz", "*_stagei.npz")  # of a subject: AMASS keeps them beside its clips
+# Of a subject, which AMASS keeps beside its clips, and what macOS leaves beside each file on other disks.
+SHAPE_FILES = ("shape.npz", "*_stagei.npz", "._*")
 CMU_FILE = re.compile(r"(\d+_\d+)(_poses|_stageii)?")  # CMU's number of a clip; AMASS adds to it
 
 

@@ -79,6 +79,7 @@ def test_a_garment_of_ones_own_goes_through_a_run(tmp_path):
 def test_a_file_of_a_body_shape_beside_clips_is_left_out(tmp_path, refused):
     folder = Path(write_motions(tmp_path / "01", "01_01", "a b"))  # a subject of AMASS
     np.savez(folder / "shape.npz", gender=np.array("male"), betas=np.zeros(16))
+    (folder / "._01_01.npz").write_bytes(b"\0\5\x16\7of macOS")
     assert set(planned(*WORDS, "--motions", str(folder)).inputs.motions) == {"01_01", "a b"}
     (folder / "b.npz").write_bytes(b"PK")
     # A shape that is named by itself was meant to be a motion.

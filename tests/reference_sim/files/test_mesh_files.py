@@ -141,13 +141,14 @@ def test_a_bad_file_is_named_with_what_is_wrong(tmp_path, capfd, name, text, mes
 
 def test_a_sequence_follows_the_numbers_in_its_names(tmp_path):
     positions, faces = sphere(1)
-    for k in (0, 2, 10, 1):
+    for k in (8, 12, 10, 6):
         write(tmp_path / "walk" / f"body_{k}.ply", positions + k, faces)
     (tmp_path / "walk" / "notes.txt").write_text("not a mesh")
+    (tmp_path / "walk" / "._body_8.ply").write_bytes(b"\0\5\x16\7of macOS")
     for pattern in (tmp_path / "walk", tmp_path / "walk" / "body_*.ply"):
         moving, first = read_sequence(pattern)
         assert moving.shape == (4, len(positions), 3)
-        np.testing.assert_allclose(moving[:, 0, 0] - positions[0, 0], [0, 1, 2, 10], atol=1e-6)
+        np.testing.assert_allclose(moving[:, 0, 0] - positions[0, 0], [6, 8, 10, 12], atol=1e-6)
         np.testing.assert_array_equal(first.faces, faces)
     still, _ = read_sequence(tmp_path / "walk" / "body_10.ply")
     assert still.shape == (1, len(positions), 3)
@@ -165,6 +166,27 @@ def test_a_sequence_that_does_not_correspond_is_refused(tmp_path):
     ):
         with pytest.raises(MeshError, match=message):
             read_sequence(tmp_path / pattern)
+
+
+@pytest.mark.parametrize(
+    ("names", "message"),
+    [
+        (
+            "w1.obj w2.obj w4.obj",
+            r"w4\.obj: its number is 2 above that of w2\.obj, and others follow by 1",
+        ),
+        ("w00.obj w03.obj w04.obj w05.obj", r"w03\.obj: its number is 3 above that of w00\.obj"),
+        ("w1.obj w01.obj w2.obj w3.obj", "its number is 0 above that of"),
+        ("rest.obj w1.obj w2.obj", r"rest\.obj: differs from w2\.obj in more than a number"),
+        ("a1_1.obj a1_2.obj a2_1.obj", r"a1_1\.obj: differs from a2_1\.obj in more than a number"),
+    ],
+)
+def test_a_sequence_with_a_gap_or_a_stranger_is_refused(tmp_path, names, message):
+    for name in names.split():
+        write(tmp_path / "walk" / name, *sphere(1))
+    for pattern in (tmp_path / "walk", tmp_path / "walk" / "*.obj"):
+        with pytest.raises(MeshError, match=message):
+            read_sequence(pattern)
 
 
 SHEET = grid(6, 5, width=0.4, depth=0.3)
