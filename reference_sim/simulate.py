@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 from reference_sim.cloth import Cloth, MeshError
 from reference_sim.command_line import Parser, announce_compilation, command
 from reference_sim.files.mesh_files import read_mesh, read_sequence, to_metres_y_up
+from reference_sim.geometry.topology import refuse_open_seams
 from reference_sim.material import Material
 
 if TYPE_CHECKING:
@@ -99,7 +100,9 @@ def read_cloth(options: argparse.Namespace) -> Cloth:
     surface = read_mesh(options.garment)
     positions = to_metres_y_up(surface.positions, units=options.units, up=options.up)
     try:
-        return Cloth(positions, surface.faces, material, pins=choose_pins(options.pins, positions))
+        cloth = Cloth(positions, surface.faces, material, pins=choose_pins(options.pins, positions))
+        refuse_open_seams(positions, surface.faces)
+        return cloth
     except MeshError as error:
         raise ValueError(f"{options.garment}: {error}") from None
 

@@ -9,11 +9,10 @@ import igl
 import numpy as np
 from numpy.typing import ArrayLike
 from scipy.sparse import coo_array
-from scipy.spatial import cKDTree
 
 from reference_sim.cloth import Cloth
 from reference_sim.geometry.closest_point import FaceSearch
-from reference_sim.geometry.topology import Array, Index, boundary_loops, edge_uses, half_edges
+from reference_sim.geometry.topology import Array, Index, boundary_loops, half_edges
 from reference_sim.material import Material
 from snug.body.parametric_body import Body
 from snug.body.skeleton import JOINT_NAMES
@@ -169,8 +168,6 @@ def enclosed_limbs(body: Body, positions: Array, faces: Index) -> tuple[str, ...
 
 
 ARMHOLE = 0.2  # share of the upper arm, beyond which an opening is a sleeve
-# of the mean boundary edge: between boundary vertices that no edge joins, a seam left open
-OPEN_SEAM = 0.05
 # share of a hip joint's distance from the middle, beyond which an opening is a sleeve or a leg
 MIDDLE = 0.5
 ORDER = ("neck", "waist", "left_sleeve", "right_sleeve", "left_armhole", "right_armhole", "left_leg",
@@ -237,21 +234,3 @@ def piece_of_faces(faces: Index) -> Index:
     [0, 1, 0]
     """
     return np.unique(igl.vertex_components(faces)[faces[:, 0]], return_inverse=True)[1]
-
-
-def open_seam(positions: Array, faces: Index) -> tuple[Index, float]:
-    """Return the boundary vertices (n,) at which a seam was left open, and its largest gap [m].
-
-    They lie within `OPEN_SEAM` mean boundary edges of a boundary vertex that no edge joins them with.
-    """
-    edges, uses = edge_uses(faces)
-    rim = edges[uses == 1]
-    if not len(rim):
-        return np.empty(0, dtype=np.int64), 0.0
-    length = np.linalg.norm(positions[rim[:, 0]] - positions[rim[:, 1]], axis=1).mean()
-    vertices = np.unique(rim)
-    pairs = cKDTree(positions[vertices]).query_pairs(OPEN_SEAM * length, output_type="ndarray")
-    pairs = np.sort(vertices[pairs], axis=1)
-    apart = pairs[~np.isin(pairs @ [len(positions), 1], edges @ [len(positions), 1])]
-    gaps = np.linalg.norm(positions[apart[:, 0]] - positions[apart[:, 1]], axis=1)
-    return np.unique(apart), float(gaps.max(initial=0.0))

@@ -6,6 +6,7 @@ from dataclasses import replace
 from itertools import product
 from pathlib import Path
 
+import igl
 import numpy as np
 
 from reference_sim.cloth import Cloth
@@ -18,7 +19,7 @@ from reference_sim.files.mesh_files import (
     rest_chart,
     to_metres_y_up,
 )
-from reference_sim.geometry.topology import Array, Index
+from reference_sim.geometry.topology import Array, Index, refuse_open_seams
 from reference_sim.material import Material
 from reference_sim.obstacle import Obstacle
 from snug.body.parametric_body import Body
@@ -28,7 +29,6 @@ from snug.garments.garment import (
     GarmentError,
     find_weights,
     name_openings,
-    open_seam,
     piece_of_faces,
 )
 from snug.garments.implicit_surface import skin_following
@@ -89,13 +89,7 @@ def _make_garment(file: GarmentFile, body: Body, raw: Surface, material: Materia
         text = f"{material.areal_density:.3g} kg/m^2, {1e3 * material.thickness:.3g} mm thick"
         raise ValueError(f"its material is {text}: give thickness in m and density in kg/m^3")
     Cloth(positions, faces, rest_uv=chart)  # sheets that can be simulated, consistently wound
-    seam, gap = open_seam(positions, faces)
-    if len(seam):
-        place = ", ".join(f"{x:.3f}" for x in positions[seam[0]])
-        raise ValueError(
-            f"{len(seam)} vertices of a seam lie up to {1e3 * gap:.2g} mm apart, one at ({place}) m: merge "
-            f"vertices closer than {1.1e3 * gap:.2g} mm; where a slit is meant, open it wider"
-        )
+    refuse_open_seams(positions, faces)
     loops = name_openings(body, positions, faces)
     if not loops:
         raise ValueError("it has no opening, the surface is closed: cut where head and limbs come out")
@@ -161,14 +155,14 @@ def _misfit(body: Body, skin: Obstacle, positions: Array, distances: Array) -> s
 def _wind_outward(
     positions: Array, faces: Index, chart: Array | None, skin: Obstacle
 ) -> tuple[Index, Array | None]:
-    """Return faces and chart, with each piece turned that is inside out."""
+    """Return faces and chart, each piece wound one way, with its outside on the outside."""
+    given, faces = faces, np.asarray(igl.bfs_orient(faces)[0], dtype=np.int64)
     corners = positions[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     outward = np.einsum("fi,fi->f", normals, skin.planes(corners.mean(axis=1), 0).normals) > 0
     areas, pieces = np.linalg.norm(normals, axis=1), piece_of_faces(faces)
     turned = (np.bincount(pieces, areas * outward) <= OUTWARD * np.bincount(pieces, areas))[pieces]
-    if not turned.any():
-        return faces, chart
+    turned ^= (faces != given).any(axis=1)
     if chart is not None:
         chart = np.where(turned[:, None, None], chart[:, ::-1], chart)
-    return np.ascontiguousarray(np.where(turned[:, None], faces[:, ::-1], faces)), chart
+    return np.ascontiguousarray(np.where(turned[:, None], given[:, ::-1], given)), chart
