@@ -29,8 +29,14 @@ class Parser(argparse.ArgumentParser):
         super().__init__(formatter_class=plain, allow_abbrev=False, **options)
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
-        """Parse as the base class does. Raises WrongWord also for an empty value, as "$UNSET" leaves one."""
+        """Parse as the base class does.
+
+        Raises WrongWord also for an empty value, as "$UNSET" leaves one, and for names that are no text.
+        """
         arguments = sys.argv[1:] if args is None else args
+        for word in (*arguments, os.getcwd()):
+            if word.encode(errors="replace").decode() != word:
+                self.error(f"{word!a} is no text: rename this file or folder")
         for before, word in zip(["", *arguments], arguments):
             if not word.strip(", ") or (word.startswith("--") and word.endswith("=")):
                 self.error(f"{before} '{word}' names nothing: give a value, or leave it out")
@@ -95,5 +101,18 @@ def announce_compilation() -> None:
     else:
         of_user = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
         folders = [Path(__file__).parent, Path(of_user, "numba")]
-    if not any(chain.from_iterable(folder.rglob("reference_sim.*-*/*.nbi") for folder in folders)):
-        print("first use: kernels are compiled, which takes one to five minutes once", file=sys.stderr)
+    if any(chain.from_iterable(folder.rglob("reference_sim.*-*/*.nbi") for folder in folders)):
+        return
+    message = "first use: kernels are compiled, which takes one to five minutes once"
+    if not any(map(_can_be_written, folders)):
+        message = (
+            "kernels are compiled in one to five minutes, in each process anew, for nothing can be kept in "
+            f"{' or '.join(map(str, folders))}: set NUMBA_CACHE_DIR to a folder that can be written"
+        )
+    print(message, file=sys.stderr)
+
+
+def _can_be_written(folder: Path) -> bool:
+    """Return whether a folder can be written, or made."""
+    nearest = next(path for path in (folder, *folder.parents) if os.path.exists(path))
+    return os.path.isdir(nearest) and os.access(nearest, os.W_OK)

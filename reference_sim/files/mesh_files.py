@@ -7,6 +7,7 @@ program has doubled for the sake of its chart are joined.
 from __future__ import annotations
 
 import glob
+import os
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -24,6 +25,8 @@ from reference_sim.geometry.topology import corner_areas
 MESH_SUFFIXES = tuple(READERS)
 METRES = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 UP_AXES = ("y", "z")
+BYTES_A_VERTEX = 23e3  # of a simulation, measured up to 64,000 vertices
+MEMORY_SHARE = 0.8  # of a machine's memory, which a simulation may take
 LARGEST_COORDINATE = 1e12  # in any unit: squares and cubes of it are still numbers
 
 
@@ -157,6 +160,16 @@ def _in_order(paths: list[Path]) -> list[Path]:
                 "add the frames that are missing, or number the files evenly"
             )
     return frames
+
+
+def refuse_too_many(vertices: int) -> None:
+    """Raise MeshError for more vertices than the memory of this machine is enough to simulate."""
+    memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
+    if vertices * BYTES_A_VERTEX > MEMORY_SHARE * memory:
+        raise MeshError(
+            f"has {vertices} vertices, which take some {vertices * BYTES_A_VERTEX / 1e9:.0f} GB of memory to "
+            f"simulate, and this machine has {memory / 1e9:.0f} GB: decimate the mesh"
+        )
 
 
 def to_metres_y_up(positions: np.ndarray, *, units: str = "m", up: str = "y") -> np.ndarray:

@@ -17,6 +17,9 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
+import os
+import tempfile
+import warnings
 from collections.abc import Callable, Iterator
 from functools import cache, partial
 from importlib import import_module
@@ -37,6 +40,9 @@ CONSTANTS = (bool, int, float, complex, str, tuple, np.generic)
 FLAGS = (set, frozenset)  # of fastmath
 
 _config: Any = numba.config
+if _config.DISABLE_JIT:  # in other processes that this one starts too
+    warnings.warn("NUMBA_DISABLE_JIT is not heeded: kernels run compiled alone", stacklevel=2)
+    _config.DISABLE_JIT, os.environ["NUMBA_DISABLE_JIT"] = 0, "0"
 _digests: dict[str, str] = {}  # of modules that hold kernels, by name
 _folders: dict[str, Path | None] = {}
 
@@ -112,6 +118,7 @@ def _folder(function: Any, digest: str) -> Path | None:
         folder = Path(base, f"{function.__module__}-{digest}")
         with contextlib.suppress(OSError):
             folder.mkdir(parents=True, exist_ok=True)
+            tempfile.TemporaryFile(dir=folder).close()  # numba asks for a folder that can be written
             return folder
     return None
 

@@ -16,6 +16,7 @@ from reference_sim.files.mesh_files import (
     Surface,
     join_seams,
     read_mesh,
+    refuse_too_many,
     rest_chart,
     to_metres_y_up,
 )
@@ -76,6 +77,7 @@ def read_garment(file: GarmentFile | str | Path, body: Body) -> Garment:
 
 def _make_garment(file: GarmentFile, body: Body, raw: Surface, material: Material) -> Garment:
     """Return the garment of a surface as it is in the file. Raises ValueError: problem, remedy."""
+    refuse_too_many(len(raw.positions))
     positions = to_metres_y_up(raw.positions, units=file.units, up=file.up) + np.asarray(file.shift)
     surface, _ = join_seams(replace(raw, positions=positions))
     skin = Obstacle(body.template, body.faces)

@@ -20,6 +20,8 @@ from reference_sim.command_line import announce_compilation, command
             "--body '' names nothing: give a value",
         ),  # of an unset variable
         ("benchmarks.run", ["--body="], "'--body=' names nothing"),
+        # Bytes that are no UTF-8.
+        ("snug.check", ["b\udcff/a.obj"], r"'b\udcff/a.obj' is no text: rename"),
     ],
 )
 def test_a_wrong_word_is_one_line_with_the_name_of_the_command(
@@ -74,3 +76,7 @@ def test_compilation_is_announced_where_no_compiled_kernel_lies_on_disk(tmp_path
     (folder / "sweep-1.py311.nbi").touch()
     announce_compilation()
     assert capsys.readouterr().err == ""
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "file" / "kernels"))
+    announce_compilation()
+    assert "in each process anew" in (error := capsys.readouterr().err) and "set NUMBA_CACHE_DIR" in error

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from reference_sim import Trajectory
+from reference_sim.files import mesh_files
 from reference_sim.trajectory import write_obj
 from tests.reference_sim.meshes import grid, sphere
 from tests.snug.garments.garment_files import doubled_along
@@ -73,6 +74,12 @@ def test_bad_input_ends_in_one_line_and_writes_nothing(simulate, capsys, tmp_pat
     error = capsys.readouterr().err
     assert message in error and error.splitlines()[-1].startswith("simulate: ")
     assert not list(tmp_path.glob("a.*"))
+
+
+def test_a_mesh_that_takes_more_memory_than_there_is_is_refused_at_once(simulate, capsys, monkeypatch):
+    monkeypatch.setattr(mesh_files, "BYTES_A_VERTEX", 1e15)
+    assert simulate("sheet.obj -o a.vtkhdf") == 2
+    assert "has 49 vertices, which take some 49000000 GB of memory" in capsys.readouterr().err
 
 
 def test_an_import_of_the_command_leaves_the_function_where_it_is():
