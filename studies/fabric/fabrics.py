@@ -5,8 +5,9 @@
 | measured.csv | a table of fabrics with a row of heads; five, spread over the bending lengths, are tested |
 | GAUGE-Dataset | a copy of GAUGE (Wang et al. 2026), of which the metadata of textiles is read |
 
-Columns of measured.csv are known by their heads, in any order; others are left alone, and a line without
-a name is called by its number:
+Columns of measured.csv are known by their heads, in any order; others are left alone, a line without a
+name is called by its number, and fabrics of one name are numbered. With semicolons between its cells, a
+comma is the decimal sign:
 
     name, density[g/m2], bending warp[uN.m], bending weft[uN.m]
     voile, 62, 2.1, 1.4
@@ -121,39 +122,59 @@ def read_fabrics(path: Path) -> tuple[Fabric, ...]:
         DeclarationError: not understood, a missing column, or a number out of its range; names the line.
     """
     try:
-        lines = list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines()))
+        rows = path.read_text(encoding="utf-8-sig").splitlines()
+        decimal_comma = bool(rows) and ";" in rows[0]  # as spreadsheets of half of Europe write
+        lines = list(csv.reader(rows, delimiter=";" if decimal_comma else ","))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise DeclarationError(f"{path}: cannot be read ({error}): give a CSV file") from None
-    heads = {re.sub(r"\s", "", head): place for place, head in enumerate(lines[0] if lines else ())}
-    columns = {HEADS[head][0]: (place, HEADS[head][1]) for head, place in heads.items() if head in HEADS}
+    columns: dict[str, tuple[int, float]] = {}
+    for place, head in enumerate(re.sub(r"\s", "", head) for head in (lines[0] if lines else ())):
+        if head in HEADS:
+            field, unit = HEADS[head]
+            if field in columns:
+                raise DeclarationError(f"{path}: line 1 has two columns for {field}: leave one")
+            columns[field] = (place, unit)
     if missing := [field for field in RANGES if field not in columns]:
         absent = ", ".join(missing)
         raise DeclarationError(f"{path}: line 1 has no column for {absent}: its heads are {EXPECTED}")
     fabrics = [
-        _fabric(f"{path}: line {number}", number, line, columns)
+        _fabric(f"{path}: line {number}", number, line, len(lines[0]), columns, decimal_comma)
         for number, line in enumerate(lines[1:], start=2)
         if any(cell.strip() for cell in line)
     ]
     if not fabrics:
         raise DeclarationError(f"{path}: holds no fabric below its heads")
-    return tuple(fabrics)
+    return _named_apart(fabrics)
 
 
 def _fabric(
-    where: str, number: int, line: Sequence[str], columns: dict[str, tuple[int, float]]
-) -> Fabric:
+    where: str, number: int, line: Sequence[str], heads: int, columns: dict[str, tuple[int, float]],
+    decimal_comma: bool,
+) -> Fabric:  # fmt: skip
     """Return the fabric of one line. Raises DeclarationError."""
-    if len(line) <= max(place for place, _ in columns.values()):
-        raise DeclarationError(f"{where}: ends before its last column: give it as many cells as heads")
+    if len(line) < heads or any(cell.strip() for cell in line[heads:]):
+        raise DeclarationError(f"{where}: has {len(line)} cells for {heads} heads: give it as many")
     values = {}
     for field in RANGES:
         place, unit = columns[field]
         try:
-            values[field] = unit * float(line[place])
+            values[field] = unit * float(line[place].replace(",", "." if decimal_comma else ","))
         except ValueError:
             raise DeclarationError(f"{where}: {field} '{line[place].strip()}' is no number") from None
     name = plain_name(line[columns["name"][0]]) if "name" in columns else ""
     return _in_range(where, Fabric(name or f"line_{number}", **values))
+
+
+def _named_apart(fabrics: Sequence[Fabric]) -> tuple[Fabric, ...]:
+    """Return the fabrics, names that several have with a number behind: scenes are told apart by them."""
+    named: dict[str, Fabric] = {}
+    for fabric in fabrics:
+        name, number = fabric.name, 1
+        while name in named:
+            number += 1
+            name = f"{fabric.name}_{number}"
+        named[name] = replace(fabric, name=name)
+    return tuple(named.values())
 
 
 def _in_range(where: str, fabric: Fabric) -> Fabric:
@@ -181,16 +202,17 @@ def read_gauge(folder: Path) -> tuple[Fabric, ...]:
     except (OSError, KeyError, TypeError, AttributeError, ValueError) as error:
         why = f"not the metadata of a textile task ({type(error).__name__}: {error})"
         raise DeclarationError(f"{path}: {why}: download it again") from None
-    return tuple(
-        _in_range(f"{path}: {key}", Fabric(plain_name(key), density, k, k))
-        for key, (density, k) in read.items()
+    return _named_apart(
+        [
+            _in_range(f"{path}: {key}", Fabric(plain_name(key), density, k, k))
+            for key, (density, k) in read.items()
+        ]
     )
 
 
 def spread_sample(fabrics: Sequence[Fabric]) -> tuple[Fabric, ...]:
-    """Return at most five fabrics of different names, spread over the order of bending length."""
-    by_name = {fabric.name: fabric for fabric in fabrics}
-    ordered = sorted(by_name.values(), key=lambda fabric: fabric.bending_length)
+    """Return at most five of the fabrics, spread over the order of bending length."""
+    ordered = sorted(fabrics, key=lambda fabric: fabric.bending_length)
     places = [math.floor(quantile * len(ordered)) for quantile in QUANTILES if ordered]
     return tuple(ordered[place] for place in dict.fromkeys(places))
 

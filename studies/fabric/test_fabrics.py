@@ -135,6 +135,9 @@ def test_a_file_is_read_in_si_and_by_its_heads(tmp_path):
     voile, twill = read_fabrics(path)
     assert voile == Fabric("voile", pytest.approx(0.062), pytest.approx(2.1e-6), pytest.approx(1.4e-6))
     assert twill.name == "twill_2_1"
+    spreadsheet = TABLE.replace(",", ";").replace("2.1; 1.4", "2,1; 1,4").replace("twill 2/1", "voile")
+    path.write_text(f"\ufeff{spreadsheet}; ;;\n")
+    assert read_fabrics(path) == (voile, replace(twill, name="voile_2"))
     path.write_text("linear weft[SI*1e9], density[kg.m-2], linear warp[SI*1e9]\n1400, 0.062, 2100\n")
     (unnamed,) = read_fabrics(path)
     assert unnamed.name == "line_2" and unnamed.bending_length == pytest.approx(voile.bending_length)
@@ -150,7 +153,12 @@ def test_a_file_is_read_in_si_and_by_its_heads(tmp_path):
         (TABLE.replace("2.1", "soft"), "line 2: warp 'soft' is no number"),
         (TABLE.replace("62", "62000"), "line 2: density 62 in SI units"),
         (TABLE.replace("2.1", "nan"), "line 2: warp nan"),
-        ("density[g/m2],bending warp[uN.m],bending weft[uN.m],name\n62,2.1,1.4", "line 2: ends before"),
+        (
+            "density[g/m2],bending warp[uN.m],bending weft[uN.m],name\n62,2.1,1.4",
+            "line 2: has 3 cells",
+        ),
+        (TABLE.replace("2.1, 1.4", "2,1, 1,4"), "line 2: has 6 cells for 4"),
+        (TABLE.replace("name", "density[kg.m-2]", 1), "line 1 has two columns for density"),
     ],
 )
 def test_a_bad_file_is_refused_with_its_line(tmp_path, text, complaint):
