@@ -10,7 +10,8 @@ RUN is a folder of reports/published:
 
 front of RUN                                 the answer of README
 table NAME of RUN; COLUMN, ...; METHOD, ...  all where none is named
-claims primary of RUN, ...                   or exploratory: by the first run that has both methods
+claims primary of RUN, ...                   or exploratory: by the first run that has both methods,
+                                             which the verdict names unless it is the first of these
 counts of RUN, ...                           how many claims came out how
 runs of RUN, ...                             day, commit and processor
 evaluations of published runs                how often they evaluated test motions
@@ -119,15 +120,17 @@ def _judged(*folders: Path) -> tuple[dict[Claim, tuple[str, Judged]], dict[str, 
 
 
 def claim_rows(family: str, folders: Sequence[Path]) -> Rows:
-    """Return a heading and a row of each claim of a family, judged by these runs or not."""
+    """Return a heading and a row of each test of a family, judged by these runs or not; each claim once."""
     verdicts, labels, headings = _judged(*folders)
-    rows = [["Claim", "Tested", "Effect", "Interval", "p", "Verdict", "Run"]]
+    rows = [["Claim", "Tested", "Effect", "Interval", "p", "Verdict"]]
+    before = ""
     for claim in FAMILIES[family]:
         lower, higher = (labels.get(method, method) for method in (claim.lower, claim.higher))
         relation = f"{lower} {claim.relation} {higher}"
+        says, before = "" if claim.says == before else claim.says, claim.says
         if claim not in verdicts:
             heading = headings.get(claim.metric, claim.metric)
-            rows.append([claim.says, f"{heading}: {relation}", DASH, DASH, DASH, NOT_MEASURED, DASH])
+            rows.append([says, f"{heading}: {relation}", DASH, DASH, DASH, NOT_MEASURED])
             continue
         name, line = verdicts[claim]
         far = line.compared.effect
@@ -137,7 +140,8 @@ def claim_rows(family: str, folders: Sequence[Path]) -> Rows:
             interval = " to ".join(number(end) for end in far.interval or ()) or DASH
         p = DASH if line.p is None else number(line.p, 2)
         tested = f"{measure_of(line.compared).heading}: {relation}"
-        rows.append([claim.says, tested, effect, interval, p, line.verdict + line.remark, name])
+        by = "" if name == folders[0].name else f" (`{name}`)"
+        rows.append([says, tested, effect, interval, p, line.verdict + line.remark + by])
     return rows
 
 
@@ -240,14 +244,14 @@ def _overview(folders: Sequence[Path], wanted: Sequence[str], methods: Sequence[
 
 
 def _table(folder: Path, name: str, wanted: Sequence[str], methods: Sequence[str]) -> str:
-    """Return a table of a run with its caption: these columns and methods, all where none is named."""
+    """Return a table of a run: these columns and methods, all where none is named; what its marks mean."""
     run, table = read_published(folder), _made(folder, name)
     place = next((place for place, column in enumerate(table.columns) if column.method), 0)
     lines = [row for row in table.rows if not methods or row[place] in methods]
     if absent := set(methods) - {str(row[place]) for row in lines}:
         raise KeyError(f"{name} of {folder.name}: {', '.join(sorted(absent))}")
     rows = text_rows(run, replace(table, rows=tuple(lines)), wanted)
-    return f"{markdown_table(rows)}\n\n{' '.join(filter(None, [table.caption, remarks_on(rows)]))}"
+    return f"{markdown_table(rows)}\n\n{remarks_on(rows)}".strip()
 
 
 @cache
@@ -283,7 +287,7 @@ def chosen_rows(rows: Rows, names: Sequence[str]) -> Rows:
     >>> chosen_rows([("Field", "Content"), ("`dt`", "[s]"), ("`frames`", "number")], ["frames"])
     [('Field', 'Content'), ('`frames`', 'number')]
     """
-    row_of_name = {name: row for row in rows[1:] for name in re.findall(r"[\w-]+", row[0])}
+    row_of_name = {name: row for row in rows[1:] for name in re.findall(r"[\w/-]+", row[0])}
     return [rows[0], *(row_of_name[name] for name in names)] if names else rows
 
 
@@ -315,22 +319,21 @@ def docstring_rows(module: str) -> Rows:
 
 
 def recipe_rows(names: str) -> Rows:
-    """Return a heading and a row of each option in which recipes differ: values, first sentence on it.
+    """Return a heading and a row of each option in which recipes differ, with its values.
 
     Args:
         names: of the recipes, as "default, paper".
 
-    >>> recipe_rows("default, paper")[4][:3]
+    >>> recipe_rows("default, paper")[4]
     ('`zero_last_layer`', 'True', 'False')
     """
     chosen = names.split(", ")
     rows = []
-    for option, meaning in attribute_rows("snug.recipe.Recipe")[2:]:
+    for option, _ in attribute_rows("snug.recipe.Recipe")[2:]:
         values = [getattr(RECIPES[name], option.strip("`")) for name in chosen]
         if len(set(values)) > 1:
-            texts = (f"{value:g}" if isinstance(value, float) else str(value) for value in values)
-            rows.append((option, *texts, meaning.partition(". ")[0]))
-    return [("Option", *(f"Recipe `{name}`" for name in chosen), "Meaning"), *rows]
+            rows.append((option, *(f"{v:g}" if isinstance(v, float) else str(v) for v in values)))
+    return [("Option", *(f"Recipe `{name}`" for name in chosen)), *rows]
 
 
 def metric_rows() -> Rows:
@@ -365,7 +368,7 @@ def part_rows() -> Rows:
 
 
 PARTS = {
-    "metrics": metric_rows,
+    "metrics of benchmarks": metric_rows,
     "sizes": size_rows,
     "studies": study_rows,
     "parts": part_rows,
