@@ -123,8 +123,12 @@ def read_fabrics(path: Path) -> tuple[Fabric, ...]:
     """
     try:
         rows = path.read_text(encoding="utf-8-sig").splitlines()
-        decimal_comma = bool(rows) and ";" in rows[0]  # as spreadsheets of half of Europe write
-        lines = list(csv.reader(rows, delimiter=";" if decimal_comma else ","))
+        delimiter = (
+            ";" if rows and ";" in rows[0] else ","
+        )  # spreadsheets of half of Europe write 2,1;1,4
+        if delimiter == ";" and any("," in row for row in rows[1:]):
+            rows[1:] = [row.translate(str.maketrans(",.", ".,")) for row in rows[1:]]
+        lines = list(csv.reader(rows, delimiter=delimiter))
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise DeclarationError(f"{path}: cannot be read ({error}): give a CSV file") from None
     columns: dict[str, tuple[int, float]] = {}
@@ -138,7 +142,7 @@ def read_fabrics(path: Path) -> tuple[Fabric, ...]:
         absent = ", ".join(missing)
         raise DeclarationError(f"{path}: line 1 has no column for {absent}: its heads are {EXPECTED}")
     fabrics = [
-        _fabric(f"{path}: line {number}", number, line, len(lines[0]), columns, decimal_comma)
+        _fabric(f"{path}: line {number}", number, line, len(lines[0]), columns)
         for number, line in enumerate(lines[1:], start=2)
         if any(cell.strip() for cell in line)
     ]
@@ -148,17 +152,18 @@ def read_fabrics(path: Path) -> tuple[Fabric, ...]:
 
 
 def _fabric(
-    where: str, number: int, line: Sequence[str], heads: int, columns: dict[str, tuple[int, float]],
-    decimal_comma: bool,
-) -> Fabric:  # fmt: skip
+    where: str, number: int, line: Sequence[str], heads: int, columns: dict[str, tuple[int, float]]
+) -> Fabric:
     """Return the fabric of one line. Raises DeclarationError."""
-    if len(line) < heads or any(cell.strip() for cell in line[heads:]):
+    if len(line) <= max(place for place, _ in columns.values()) or any(
+        cell.strip() for cell in line[heads:]
+    ):
         raise DeclarationError(f"{where}: has {len(line)} cells for {heads} heads: give it as many")
     values = {}
     for field in RANGES:
         place, unit = columns[field]
         try:
-            values[field] = unit * float(line[place].replace(",", "." if decimal_comma else ","))
+            values[field] = unit * float(line[place])
         except ValueError:
             raise DeclarationError(f"{where}: {field} '{line[place].strip()}' is no number") from None
     name = plain_name(line[columns["name"][0]]) if "name" in columns else ""

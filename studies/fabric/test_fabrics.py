@@ -158,6 +158,7 @@ def test_a_file_is_read_in_si_and_by_its_heads(tmp_path):
             "line 2: has 3 cells",
         ),
         (TABLE.replace("2.1, 1.4", "2,1, 1,4"), "line 2: has 6 cells for 4"),
+        (TABLE.replace(",", ";").replace("2.1; 1.4", "2,1; 1.400"), "line 2: weft '1,400' is no number"),
         (TABLE.replace("name", "density[kg.m-2]", 1), "line 1 has two columns for density"),
     ],
 )
