@@ -9,6 +9,7 @@ Nothing is allocated by a number that a file states, which may be more than its 
 from __future__ import annotations
 
 import re
+import struct
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -17,9 +18,9 @@ import numpy as np
 
 UV_NAMES = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))  # of a vertex, as programs call them
 PLY_NUMBERS = {
-    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
-    "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4",
-    "uint32": "u4", "int64": "i8", "uint64": "u8", "float32": "f4", "float64": "f8",
+    "char": "b", "uchar": "B", "short": "h", "ushort": "H", "int": "i", "uint": "I", "float": "f",
+    "double": "d", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H", "int32": "i", "uint32": "I",
+    "int64": "q", "uint64": "Q", "float32": "f", "float64": "d",
 }  # fmt: skip
 PLY_ORDER = {"ascii": "text", "binary_little_endian": "<", "binary_big_endian": ">"}
 # Points, polygons, texture coordinates, and places in these parallel to polygons, -1 for a corner
@@ -32,6 +33,8 @@ def read_contents(path: Path) -> Contents:
     try:
         with np.errstate(all="ignore"):  # numbers that are not finite are refused with their vertex
             return READERS[path.suffix.lower()](path)
+    except struct.error:
+        raise ValueError("ends before what its header states: export it again, as OBJ") from None
     except (ValueError, KeyError, OverflowError) as error:
         reason = " ".join(str(error).split())[:200]
         raise ValueError(f"cannot be read ({reason}): export it again, as OBJ") from None
@@ -68,11 +71,11 @@ def _counted(text: str, count: int) -> int:
     return number - 1 if number > 0 else count + number
 
 
-def _index(text: str) -> int:
+def _index(text: str | float) -> int:
     """Return a whole number that an array can hold. Raises ValueError."""
     number = int(text)
     if abs(number) >= 1 << 62:
-        raise ValueError(text)
+        raise ValueError(f"{text} is no index")
     return number
 
 
@@ -135,7 +138,7 @@ def _read_ply(path: Path) -> Contents:
     if head is None:
         raise ValueError("its header does not end")
     order, at = "text", head.end()
-    elements: list[tuple[str, int, dict[str, list[str]]]] = []  # name, count, types of properties
+    elements: list[tuple[str, int, dict[str, str]]] = []  # name, count, types of properties
     for line in head.group().decode("utf-8", "replace").splitlines()[1:]:
         match line.split():
             case ["format", kind, _] if kind in PLY_ORDER:
@@ -143,9 +146,9 @@ def _read_ply(path: Path) -> Contents:
             case ["element", name, count]:
                 elements.append((name, int(count), {}))
             case ["property", "list", size, kind, name] if elements and name not in elements[-1][2]:
-                elements[-1][2][name] = [PLY_NUMBERS[kind], PLY_NUMBERS[size]]
+                elements[-1][2][name] = PLY_NUMBERS[size] + PLY_NUMBERS[kind]
             case ["property", kind, name] if elements and name not in elements[-1][2]:
-                elements[-1][2][name] = [PLY_NUMBERS[kind]]
+                elements[-1][2][name] = PLY_NUMBERS[kind]
             case ["comment" | "obj_info" | "end_header", *_] | []:
                 pass
             case _:
@@ -180,49 +183,31 @@ def _read_ply(path: Path) -> Contents:
 
 
 def _read_records(
-    data: bytes, at: int, count: int, properties: dict[str, list[str]], order: str
+    data: bytes, at: int, count: int, properties: dict[str, str], order: str
 ) -> tuple[dict[str, Any], int]:
-    """Return arrays of numbers and lists of lists by property, and the place behind `count` records.
-
-    Records whose lists are as long as those of the first one left are read at once.
-    """
-    blocks: dict[str, list[np.ndarray]] = {name: [] for name in properties}
-    at_once = count
-    while count > 0 and properties:
-        if at >= len(data):
+    """Return arrays of numbers or lists of lists by property, and the place behind `count` records."""
+    codes = properties if order != "text" else {name: "d" * len(properties[name]) for name in properties}
+    order = order.replace("text", "<")
+    if max(map(len, codes.values()), default=1) == 1:  # no lists
+        record = np.dtype([(name, order + code) for name, code in codes.items()])
+        if count * record.itemsize > len(data) - at:
             raise ValueError("ends before what its header states")
-        fields: list[Any] = []
-        for name, kinds in properties.items():
-            kind, *size = ["<f8"] * len(kinds) if order == "text" else [order + kind for kind in kinds]
-            if size:
-                length = np.frombuffer(data, size[0], 1, at + np.dtype(fields).itemsize)[0]
-                if length != int(length):
-                    raise ValueError(f"a list of {name} has {length} numbers")
-                fields += [(f"size of {name}", *size), (name, kind, (int(length),))]
-            else:
-                fields.append((name, kind))
-        record = np.dtype(fields)
-        fitting = min(count, at_once, (len(data) - at) // record.itemsize)
-        if not fitting:
-            raise ValueError("ends within a record that its header states")
-        records = np.frombuffer(data, record, fitting, at)
-        sizes = [records[name] for name in record.names or () if name not in properties]
-        other = np.any([size != size[0] for size in sizes], axis=0) if sizes else np.zeros(1, dtype=bool)
-        alike = int(np.argmax(other)) or fitting
-        for name, (kind, *_) in properties.items():
-            numbers = records[name][:alike]
-            typed = numbers.astype(kind)
-            if kind[0] != "f" and (typed != numbers).any():
-                raise ValueError(f"a number of {name} is not whole")
-            blocks[name].append(typed)
-        at, count, at_once = at + alike * record.itemsize, count - alike, 2 * alike
-    values = {
-        name: [row for block in blocks[name] for row in block.tolist()]
-        if len(kinds) > 1
-        else np.concatenate([np.empty(0), *blocks[name]])
-        for name, kinds in properties.items()
-    }
-    return values, at
+        table = np.frombuffer(data, record, count, at) if count else np.empty(0, record)
+        return {name: table[name].astype(code) for name, code in properties.items()}, at + table.nbytes
+    values: dict[str, Any] = {name: [] for name in properties}
+    for _ in range(count):
+        for name, code in codes.items():
+            row: tuple[Any, ...] = (1,)
+            for kind in code:  # a list's length, and its numbers
+                kinds = f"{order}{int(row[0])}{kind}"
+                row = struct.unpack_from(kinds, data, at)
+                at += struct.calcsize(kinds)
+            if properties[name][-1] not in "fd":
+                if any(number != int(number) for number in row):
+                    raise ValueError(f"a number of {name} is not whole")
+                row = tuple(map(_index, row))
+            values[name].append(row)
+    return {n: v if len(codes[n]) > 1 else np.array(v)[:, 0] for n, v in values.items()}, at
 
 
 READERS: dict[str, Callable[[Path], Contents]] = {
