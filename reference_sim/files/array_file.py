@@ -96,6 +96,9 @@ class _Stand:
         return dense
 
 
+# Arrays of joblib follow the names of their wrappers as raw bytes, between the pickle's own.
+JOBLIB = b"joblib.numpy_pickle"
+COMPRESSED = (b"x\x01", b"x\x5e", b"x\x9c", b"x\xda", b"\x1f\x8b", b"BZh", b"\xfd7zXZ", b"\x04\x22M\x18")
 STANDS = ("chumpy.ch.Ch", "csc_matrix", "csc_array")
 
 
@@ -119,6 +122,10 @@ def read_pickled_arrays(path: str | Path, names: Collection[str]) -> dict[str, n
     arrays = {}
     try:
         with path.open("rb") as stream:
+            if (start := stream.read(1 << 16)).startswith(COMPRESSED) or JOBLIB in start:
+                how = "was written by joblib" if JOBLIB in start else "is compressed"
+                raise ValueError(f"{how}: load it by joblib.load and write its arrays by numpy.savez")
+            stream.seek(0)
             # The unpickler makes a table as long as the largest place that an object is put in.
             size = path.stat().st_size
             if any((at or 0) > size for op, at, _ in genops(stream) if op.name.endswith("PUT")):

@@ -8,6 +8,7 @@ G_bone = G_parent C M C^-1 is its rotation in the world. Its far end lies at G_b
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -47,18 +48,21 @@ class Bone:
 
 
 def read_asf_amc(path: Path, options: MotionFileOptions) -> Motion:
-    """Read an .amc with the .asf of its subject (01_05.amc: 01.asf, or 01_05.asf), in the file's axes.
+    """Read an .amc with the .asf of its subject, in the file's axes.
 
+    Of the skeletons beside it, that is the one with the longest name that begins the clip's: 01.asf of
+    01_05.amc, HDM_bd.asf of HDM_bd_01.amc.
     The path is scaled by the ratio of leg lengths, so that steps and legs agree.
 
     Raises:
         MotionError: no skeleton, a damaged file, or a skeleton without the bones of CMU's.
     """
-    names = (path.stem, path.stem.split("_")[0])
-    candidates = [path.with_name(name + end) for name in names for end in (".asf", ".ASF")]
-    file = next((file for file in candidates if file.is_file()), None)
+    beside = (file for file in path.parent.glob("*") if file.suffix.lower() == ".asf")
+    begins = [file for file in beside if re.match(re.escape(file.stem) + r"(?![^\W_])", path.stem)]
+    file = max(begins, key=lambda file: len(file.stem), default=None)
     if file is None:
-        raise MotionError(f"its skeleton {names[1]}.asf is missing; put it beside the clip")
+        subject = path.stem.split("_")[0]
+        raise MotionError(f"its skeleton {subject}.asf is missing; put it beside the clip")
     try:
         bones, metres = read_asf(file)
     except MotionError as error:

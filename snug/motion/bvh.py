@@ -20,6 +20,7 @@ from snug.motion.motion import Motion, MotionError
 from snug.motion.recording import finite_numbers, frame_rate, parse_lines
 from snug.motion.retarget import FEET, LIMBS, match_joints, retarget, way_up
 
+MAX_LEAN = 40.0  # [degrees] of the trunk of a zero pose: its spine takes our upright one's place
 CHANNELS = {f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ"}
 
 
@@ -104,6 +105,12 @@ def _standing(at: Mapping[str, np.ndarray]) -> tuple[np.ndarray, float]:
     across = float(np.linalg.norm(left))
     if not (1e-6 < leg < 1e6 and across > 1e-3 * leg and up.any()):
         raise MotionError("legs or hips of its zero pose have no length; export it with offsets")
+    trunk = at["head"] - at["pelvis"]
+    if (lean := np.degrees(np.arctan2(np.linalg.norm(np.cross(up, trunk)), up @ trunk))) > MAX_LEAN:
+        raise MotionError(
+            f"its zero pose is no T or A pose: the trunk is turned by {lean:.0f} degrees; export it with a T "
+            "pose at rest"
+        )
     left /= across
     return np.stack((left, up, np.cross(left, up)), axis=1), leg
 

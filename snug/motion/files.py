@@ -31,7 +31,7 @@ from snug.file_options import MotionFileOptions
 from snug.motion.acclaim import read_asf_amc
 from snug.motion.bvh import read_bvh
 from snug.motion.motion import Motion, MotionError, clear_arms, place, resample
-from snug.motion.recording import check_recording, frame_rate, turn_y_up
+from snug.motion.recording import are_positions, check_recording, frame_rate, turn_y_up
 
 LAYOUTS = {22: "body", 24: "SMPL", 52: "SMPL+H", 55: "SMPL-X"}  # joints, the root among them
 # Of several names the first that a file has is read.
@@ -68,6 +68,8 @@ def read_smpl_arrays(path: Path, options: MotionFileOptions) -> Motion:
         raise MotionError(
             f"'{name}' has shape {arrays[name].shape}; give (frames, columns), columns one of {known}"
         )
+    if are_positions(turns):
+        raise MotionError(f"'{name}' holds positions of joints; give their rotations, axis-angle [rad]")
     poses = np.zeros((frames, len(JOINT_NAMES), 3))
     kept = poses.shape[1] if turns.shape[1] == poses.shape[1] else BODY_JOINTS
     poses[:, :kept] = turns[:, :kept]

@@ -13,7 +13,16 @@ from typing import TypeVar
 
 import numpy as np
 
-from snug.body.skeleton import JOINT, JOINT_NAMES, axis_angles, joint_positions, rotation_matrices
+from snug.body.skeleton import (
+    BODY_JOINTS,
+    JOINT,
+    JOINT_NAMES,
+    PARENTS,
+    REST_JOINTS,
+    axis_angles,
+    joint_positions,
+    rotation_matrices,
+)
 from snug.motion.motion import Motion, MotionError
 
 Content = TypeVar("Content")
@@ -110,6 +119,26 @@ def check_recording(motion: Motion) -> None:
         raise MotionError(f"jumps, first of {first}; cut the clip there, or check frame rate and units")
 
 
+MAX_BONE_CHANGE = 0.05  # share of a bone's length by which tracked joints may vary
+MAX_BONE_RATIO = 2.0  # between most bones' lengths, each relative to ours: a child's are near an adult's
+
+
+def are_positions(triples: np.ndarray) -> bool:
+    """Return whether triples (T, J, 3) of the joints of a body are their positions, in any unit.
+
+    Positions: most joints keep their distance to another one, though they move; or the bones have the
+    proportions of a person's in most frames, with the joints in our order. Rotations do neither.
+    """
+    few = triples[:: -(-len(triples) // 100), :BODY_JOINTS]
+    distances = np.linalg.norm(few[:, :, None] - few[:, None], axis=-1)
+    moved = np.linalg.norm(few.std(axis=0), axis=-1)
+    rigid = distances.std(axis=0) < MAX_BONE_CHANGE * np.minimum(distances.mean(axis=0), moved[:, None])
+    near, far = list(PARENTS[1:BODY_JOINTS]), list(range(1, BODY_JOINTS))
+    ratios = distances[:, near, far] / np.linalg.norm(REST_JOINTS[far] - REST_JOINTS[near], axis=1)
+    low, high = np.quantile(ratios, (0.1, 0.9))
+    return bool(rigid.any(axis=1).mean() > 0.8 or 0.0 < high < MAX_BONE_RATIO * low)
+
+
 # From the axes of a file, by the one that is vertical, to ours: with z up (x, y, z) becomes (x, z, -y).
 TO_Y_UP = {"y": np.eye(3), "z": np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])}
 # between the vertical and the way from ankles to head: below it a body lies or crawls
@@ -125,8 +154,8 @@ def turn_y_up(motion: Motion, up: str) -> Motion:
     fall, is fine. A given axis `up`, "y" or "z", is taken if the body stands along it.
 
     Raises:
-        MotionError: no axis is that, the given one is not, or a body that should stand along the axis
-            found travels along it: it may be crawling.
+        MotionError: no axis is that, the given one is not, the trunk hangs head down, or a body that
+            should stand along the axis found travels along it: it may be crawling.
     """
     joints = joint_positions(motion.poses, motion.translations)
     ankles = joints[:, [JOINT["left_ankle"], JOINT["right_ankle"]]].mean(axis=1)
@@ -142,6 +171,13 @@ def turn_y_up(motion: Motion, up: str) -> Motion:
         raise MotionError(
             f"the body stands along {axis} in {share} only; add ,up=y or ,up=z behind the path, "
             "turn the root's rotation and path, or give a clip that stands"
+        )
+    trunk = joints[:, JOINT["head"]] - joints[:, JOINT["pelvis"]]
+    leans = trunk[:, along] / np.linalg.norm(trunk, axis=1)
+    if (low := np.mean(leans < (-MAX_LYING_COSINE if up else 0.0))) > 0.5:
+        raise MotionError(
+            f"the head is not above the pelvis in {100 * low:.0f} % of the frames; export it with a T pose "
+            "at rest and rotations relative to the parent joint, or give a clip that stands"
         )
     rise = float(np.ptp(joints[..., along].min(axis=1)))
     if not up and rise > MAX_RISE:

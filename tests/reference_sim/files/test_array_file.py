@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import gzip
 import os
 import pickle
 import struct
+import zlib
 from collections import OrderedDict, defaultdict
 from pathlib import Path
 
@@ -143,6 +145,20 @@ def test_a_hostile_or_broken_pickle_is_refused_in_one_line_and_nothing_is_run(tm
         read_pickled_arrays(path, ("a", "x"))
     message = str(caught.value)
     assert not marker.exists() and str(path) in message and "\n" not in message and len(message) < 500
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (ARRAY[:15] + name("joblib.numpy_pickle") + name("NumpyArrayWrapper") + b"\x93\xff", "by joblib"),
+        (zlib.compress(ARRAY), "is compressed"),
+        (gzip.compress(ARRAY), "is compressed"),
+    ],
+    ids=["joblib", "zlib", "gzip"],
+)
+def test_a_pickle_of_joblib_is_refused_as_one(tmp_path, content, words):
+    with pytest.raises(ArrayFileError, match=f"{words}.* joblib.load .* numpy.savez"):
+        read_pickled_arrays(pickled(tmp_path / "a.pkl", content), ("a",))
 
 
 def test_a_pickle_that_asks_for_a_table_of_gigabytes_is_refused(tmp_path):

@@ -29,6 +29,16 @@ def test_a_broken_file_is_refused(tmp_path, ending, change, words):
     refuse(clip, words, named=broken)
 
 
+def test_a_skeleton_is_the_one_whose_name_begins_the_clips(tmp_path):
+    clip = write_clip(tmp_path, [amc_frame(1)])
+    skeleton = (tmp_path / "07.asf").rename(tmp_path / "HDM_bd.ASF")
+    for other in ("HDM", "HDM_bd_0", "HDM_bd_01_x", "._HDM_bd_01"):
+        (tmp_path / f"{other}.asf").write_text("no skeleton")
+    for name in ("HDM_bd_01.amc", "HDM_bd_01-02_03_120.amc"):
+        clip = clip.rename(tmp_path / name)
+        assert read_asf_amc(clip, MotionFileOptions()).source == f"{name} with {skeleton.name}"
+
+
 def test_a_clip_without_its_skeleton_is_refused(tmp_path):
     clip = write_clip(tmp_path, [amc_frame(1)])
     (tmp_path / "07.asf").unlink()

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from snug.body.skeleton import JOINT, REST_JOINTS, joint_positions
+from snug.body.skeleton import JOINT, JOINT_NAMES, PARENTS, REST_JOINTS, joint_positions
 from snug.motion.library import make_motion
 from snug.motion.retarget import NEEDED, match_joints
 from tests.snug.motion.motion_forms import bvh, read, refuse
@@ -130,4 +130,14 @@ def test_a_zero_pose_that_does_not_stand_is_refused(tmp_path):
         arms_up[JOINT[name]] = shoulder - (REST_JOINTS[JOINT[name]] - shoulder) * [1.0, 0.0, 0.0]
     turned = "no T or A pose: left_shoulder is turned by 180 degrees"
     refuse(written(tmp_path / "a.bvh", rest=arms_up), turned)
+    # LAFAN1's layout: every bone along x, hips and shoulders apart along z; turns make it stand.
+    along_x = np.zeros((24, 3))
+    for joint, parent in enumerate(PARENTS[1:], 1):
+        bone = REST_JOINTS[joint] - REST_JOINTS[parent]
+        across = bone[0] if JOINT_NAMES[joint].endswith(("hip", "collar")) else 0.0
+        along_x[joint] = along_x[parent] + [np.linalg.norm(bone), 0.0, across]
+    standing = np.zeros((2, 24, 3))
+    standing[:, [0, 1, 2], 2] = np.pi / 2, np.pi, np.pi
+    text = bvh(standing, np.zeros((2, 3)), 30.0, rest=along_x)
+    refuse(written(tmp_path / "a.bvh", text), "no T or A pose: the trunk is turned by 180 degrees")
     refuse(written(tmp_path / "a.bvh", rest=np.zeros((24, 3))), "legs or hips of its zero pose")

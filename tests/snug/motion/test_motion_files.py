@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from snug.body.skeleton import JOINT
+from snug.body.skeleton import JOINT, joint_positions
 from snug.file_options import SPLITS, MotionFileOptions
 from snug.motion.files import HAND_DAMPING, HANDS, load_motions
-from snug.motion.library import make_motion
+from snug.motion.library import LIBRARY, make_motion
 from snug.motion.motion import Motion, clear_arms, place, resample, transition
+from snug.motion.recording import are_positions, turn_y_up
 from tests.snug.motion.motion_forms import (
     TO_Z_UP,
     Y_UP,
@@ -92,6 +93,37 @@ FAR = KICK.translations + np.where(FROM_5, [0.5, 0.0, 0.0], 0.0)
 )
 def test_arrays_that_are_no_motion_are_refused(tmp_path, changes, words):
     refuse(write(tmp_path / "clip.npz", KICK, **changes), words)
+
+
+def upside_down(poses):
+    """The trunk folded down by half a turn above the pelvis."""
+    return np.where(np.arange(24)[:, None] == JOINT["spine1"], [np.pi, 0.0, 0.0], poses)
+
+
+PLACES = joint_positions(KICK.poses, KICK.translations)
+
+
+@pytest.mark.parametrize(
+    ("poses", "words"),
+    [
+        (PLACES, "holds positions of joints"),
+        (1000 * PLACES[:, :22], "holds positions of joints"),
+        (np.repeat(PLACES[:1, :22], 40, axis=0), "holds positions of joints"),
+        (PLACES[:, ::-1], "holds positions of joints"),
+        (PLACES - PLACES[:, :1], "holds positions of joints"),
+        (upside_down(KICK.poses), "head is not above the pelvis in 100 % of the frames"),
+    ],
+    ids=["positions", "millimetres", "standing still", "another order", "root at zero", "upside down"],
+)
+def test_arrays_that_are_no_rotations_of_a_person_are_refused(tmp_path, poses, words):
+    refuse(write(tmp_path / "clip.npz", KICK, poses=poses), words)
+
+
+@pytest.mark.parametrize("name", LIBRARY)
+def test_no_motion_of_the_library_is_taken_for_positions_or_no_person(name):
+    motion = make_motion(name)
+    assert not are_positions(motion.poses) and not are_positions(motion.poses[:1])
+    turn_y_up(motion, "y")
 
 
 def test_paths_without_a_motion_are_refused(tmp_path):
