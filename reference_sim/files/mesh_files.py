@@ -168,7 +168,7 @@ def refuse_too_many(vertices: int) -> None:
     if vertices * BYTES_A_VERTEX > MEMORY_SHARE * memory:
         raise MeshError(
             f"has {vertices} vertices, which take some {vertices * BYTES_A_VERTEX / 1e9:.0f} GB of memory to "
-            f"simulate, and this machine has {memory / 1e9:.0f} GB: decimate the mesh"
+            f"simulate, more than {MEMORY_SHARE:.0%} of this machine's {memory / 1e9:.0f} GB: decimate the mesh"
         )
 
 
