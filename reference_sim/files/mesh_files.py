@@ -167,8 +167,8 @@ def refuse_too_many(vertices: int) -> None:
     memory = os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")
     if vertices * BYTES_A_VERTEX > MEMORY_SHARE * memory:
         raise MeshError(
-            f"has {vertices} vertices, which take some {vertices * BYTES_A_VERTEX / 1e9:.0f} GB of memory to "
-            f"simulate, more than {MEMORY_SHARE:.0%} of this machine's {memory / 1e9:.0f} GB: decimate the mesh"
+            f"has {vertices} vertices, which take {vertices * BYTES_A_VERTEX / 1e9:.0f} GB of memory to "
+            f"simulate, above {MEMORY_SHARE:.0%} of this machine's {memory / 1e9:.0f} GB: decimate the mesh"
         )
 
 

@@ -79,7 +79,7 @@ def test_bad_input_ends_in_one_line_and_writes_nothing(simulate, capsys, tmp_pat
 def test_a_mesh_that_takes_more_memory_than_there_is_is_refused_at_once(simulate, capsys, monkeypatch):
     monkeypatch.setattr(mesh_files, "BYTES_A_VERTEX", 1e15)
     assert simulate("sheet.obj -o a.vtkhdf") == 2
-    assert "has 49 vertices, which take some 49000000 GB of memory" in capsys.readouterr().err
+    assert "has 49 vertices, which take 49000000 GB of memory" in capsys.readouterr().err
 
 
 def test_an_import_of_the_command_leaves_the_function_where_it_is():
