@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import contextlib
 import math
+import os
 import sys
 import tempfile
 from collections.abc import Sequence
@@ -27,6 +28,7 @@ from benchmarks.run import carry_out
 from benchmarks.score import MEASURED_BESIDE
 from benchmarks.timing import one_thread
 from reference_sim.command_line import Parser, command
+from reference_sim.files.given_files import regular
 from snug.motion.library import TEST
 
 PROGRAM = "benchmarks.submit"
@@ -80,6 +82,8 @@ class Metadata:
             (given, not path.is_absolute() and ".." not in path.parts,
                 "lies outside of the entry's folder: put it there"),
             ("scenes", set(self.scenes) <= set(SCENES), f"choose from {', '.join(SCENES)}"),
+            *((name, len(set(given)) == len(given), "give each once")
+                for name, given in (("scenes", self.scenes), ("seeds", self.seeds))),
         )  # fmt: skip
         for name, fine, otherwise in demands:
             if not fine:
@@ -173,7 +177,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def read_entry(path: Path) -> Entry:
-    """Read the metadata of an entry. Raises StudyError with file and field."""
+    """Read the metadata of an entry.
+
+    Raises EntryError for a link out of the folder, a pipe or a device, StudyError with file and field.
+    """
+    for file in path.rglob("*"):
+        if not Path(os.path.realpath(file)).is_relative_to(path.resolve()):
+            raise EntryError(f"{file}: is a link out of the entry's folder: put the file itself there")
+        if not file.is_dir():
+            regular(file)
     return Entry(path, read_fields(Metadata, path / METADATA))
 
 

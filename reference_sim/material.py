@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
+
+from reference_sim.files.given_files import read_toml
 
 GRAVITY = 9.81  # [m/s^2], downwards along -y
 
@@ -56,13 +57,12 @@ class Material:
         Fields that are left out keep their defaults. Raises ValueError that names the file.
         """
         try:
-            values = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+            values = read_toml(path)
             make = cls.from_lame if "lame_mu_pa" in values else cls
             return make(**values)
         except FileNotFoundError:
             raise ValueError(f"{path}: no such file") from None
-        except (ValueError, TypeError, OverflowError, RecursionError) as error:
-            # also of text that is none
+        except (OSError, ValueError, TypeError) as error:  # also of text that is none
             reason = " ".join(str(error).split())
             raise ValueError(f"{path}: {reason}; give fields of Material in SI units") from None
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reference_sim.files.atomic_files import replacing
+from reference_sim.files.given_files import regular
 
 if TYPE_CHECKING:
     import h5py
@@ -110,7 +111,7 @@ def _read(path: Path) -> Trajectory:
     """Read a file. Raises an exception of any kind for one that is no trajectory or is damaged."""
     import h5py
 
-    with h5py.File(path, "r") as file:
+    with h5py.File(regular(path), "r") as file:
         benchmark, vtk = file["benchmark"], file["VTKHDF"]
         provenance = json.loads(benchmark.attrs["provenance"])
         if not isinstance(provenance, dict):

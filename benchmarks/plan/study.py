@@ -17,6 +17,7 @@ from typing import Any, Literal, NoReturn, TypeVar, get_args, get_origin, get_ty
 from benchmarks.assets import FEWEST_FRAMES, LIBRARY
 from benchmarks.external.roll_out_files import RollOutOption
 from benchmarks.presets import Preset, find_preset
+from reference_sim.files.given_files import check_values, parse_toml, read_toml
 from snug.file_options import GarmentFile, MotionFileOptions
 from snug.trained import FOLDER
 
@@ -266,20 +267,25 @@ def parse_setting(text: str) -> Table:
     field, equals, value = text.partition("=")
     if not (field.strip() and equals and value.strip()):
         raise StudyError(f"--set {text}: give field=value, as in seeds=0,1,2 or sizes.frames=60")
-    return option(field.strip(), _value(value.strip()))
+    try:
+        table = option(field.strip(), _value(value.strip()))
+        check_values(table)
+    except ValueError as error:
+        raise StudyError(f"--set {text[:40]}: {error}") from None
+    return table
 
 
 def _value(text: str) -> Any:
     """Return a value of TOML, a list where there are commas, else the text."""
     try:
-        return tomllib.loads(f"x = {text}")["x"]
+        return parse_toml(f"x = {text}")["x"]
     except tomllib.TOMLDecodeError:
         return [_value(word.strip()) for word in text.split(",") if word.strip()] if "," in text else text
 
 
 def _read_table(path: Path) -> dict[str, Any]:
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
+        return read_toml(path)
     except (OSError, ValueError) as error:
         raise StudyError(f"{path}: not readable as TOML ({' '.join(str(error).split())})") from None
 

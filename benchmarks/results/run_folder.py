@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from benchmarks.provenance import digest_of_file
 from benchmarks.results.row import COLUMNS, ResultsError, Row, cells_to_row, read_json, row_to_cells
 from reference_sim.files.atomic_files import replacing
+from reference_sim.files.given_files import regular
 
 if TYPE_CHECKING:
     import numpy as np
@@ -117,7 +118,7 @@ class RunFolder:
     def read_rows(self) -> list[Row]:
         """All rows. Raises ResultsError naming file and line when the file is absent or broken."""
         try:
-            with self.rows_path.open(newline="", encoding="utf-8") as stream:
+            with regular(self.rows_path).open(newline="", encoding="utf-8") as stream:
                 reader = csv.reader(stream)
                 if next(reader, ()) != list(COLUMNS):
                     raise ResultsError(f"the columns should be {','.join(COLUMNS)}")

@@ -13,6 +13,7 @@ from typing import TypeVar
 
 import numpy as np
 
+from reference_sim.files.given_files import regular
 from snug.body.skeleton import (
     BODY_JOINTS,
     JOINT,
@@ -45,11 +46,11 @@ def parse_lines(
             ValueError.
     """
     try:
-        if path.stat().st_size > MAX_TEXT_BYTES:
+        if regular(path).stat().st_size > MAX_TEXT_BYTES:
             raise MotionError(f"larger than {MAX_TEXT_BYTES >> 20} MB; cut the clip")
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as problem:
-        raise MotionError(f"cannot be read ({problem.strerror}); check the path") from None
+        raise MotionError(f"cannot be read ({problem.strerror or problem}); check the path") from None
     unread = iter(lines)
     words = (line.partition(comment)[0].split() for line in unread)
     try:

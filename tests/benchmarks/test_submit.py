@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 from pathlib import Path
 
@@ -94,6 +95,12 @@ def test_a_file_that_is_not_as_it_was_scored_is_refused(scored, tmp_path, name, 
         ('title = "Waving"\n', "", "title is absent: give it"),
         ("milliseconds = 2.5", "milliseconds = nan", "milliseconds = nan: give a number above 0"),
         ("{scene}.npz", "../{scene}.npz", "lies outside of the entry's folder"),
+        ("seeds = [0]", f"seeds = [0]\nscenes = ['{SCENE}', '{SCENE}']", "give each once"),
+        ("seeds = [0]", "seeds = [0, 0]", "seeds = (0, 0): give each once"),
+        ("seeds = [0]", f"seeds = [{'9' * 309}]", "a whole number beyond 64 bits"),
+        ("seeds = [0]", f"seeds{'.a' * 30000} = 0", "a name of more than 32 parts"),
+        ("seeds = [0]", f"seeds = {'[' * 9000}{']' * 9000}", "tables or lists more than 32 deep"),
+        ("seeds = [0]", "#" * (1 << 20), "at most 1048576 are read"),
         (
             "seeds = [0]",
             'seeds = [0]\nscenes = ["tshirt/walk"]',
@@ -104,6 +111,26 @@ def test_a_file_that_is_not_as_it_was_scored_is_refused(scored, tmp_path, name, 
 def test_a_fault_is_one_line_with_file_and_remedy(entry, refused, old, new, fault):
     (entry / "entry.toml").write_text(TEXT.replace(old, new))
     refused(fault, main, ["check", str(entry)])
+
+
+@pytest.mark.parametrize(
+    ("name", "make", "fault"),
+    [
+        (
+            f"{SCENE}.npz",
+            lambda path: path.symlink_to("/etc/hosts"),
+            "is a link out of the entry's folder",
+        ),
+        ("part", lambda path: path.symlink_to("/etc"), "is a link out of the entry's folder"),
+        (f"{SCENE}.npz", os.mkfifo, "is no regular file"),
+        ("entry.toml", os.mkfifo, "is no regular file"),
+        ("entry.toml", lambda path: path.symlink_to("/dev/zero"), "is a link out of the entry's folder"),
+    ],
+)
+def test_links_out_of_the_folder_and_pipes_are_refused(entry, refused, name, make, fault):
+    (entry / name).unlink(missing_ok=True)
+    make(entry / name)
+    assert name in refused(fault, main, ["check", str(entry)])
 
 
 @pytest.mark.parametrize(
