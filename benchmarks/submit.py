@@ -28,7 +28,7 @@ from benchmarks.run import carry_out
 from benchmarks.score import MEASURED_BESIDE
 from benchmarks.timing import one_thread
 from reference_sim.command_line import Parser, command
-from reference_sim.files.given_files import regular
+from reference_sim.given_files import regular
 from snug.motion.library import TEST
 
 PROGRAM = "benchmarks.submit"

@@ -6,7 +6,7 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
-from reference_sim.files.given_files import read_toml
+from reference_sim.given_files import read_toml
 
 GRAVITY = 9.81  # [m/s^2], downwards along -y
 

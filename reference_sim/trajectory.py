@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reference_sim.files.atomic_files import replacing
-from reference_sim.files.given_files import regular
+from reference_sim.given_files import regular
 
 if TYPE_CHECKING:
     import h5py

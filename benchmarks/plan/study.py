@@ -17,7 +17,7 @@ from typing import Any, Literal, NoReturn, TypeVar, get_args, get_origin, get_ty
 from benchmarks.assets import FEWEST_FRAMES, LIBRARY
 from benchmarks.external.roll_out_files import RollOutOption
 from benchmarks.presets import Preset, find_preset
-from reference_sim.files.given_files import check_values, parse_toml, read_toml
+from reference_sim.given_files import check_values, parse_toml, read_toml
 from snug.file_options import GarmentFile, MotionFileOptions
 from snug.trained import FOLDER
 

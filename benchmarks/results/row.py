@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from reference_sim.files.given_files import regular
+from reference_sim.given_files import regular
 
 
 class ResultsError(ValueError):

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 from benchmarks.provenance import digest_of_file
 from benchmarks.results.row import COLUMNS, ResultsError, Row, cells_to_row, read_json, row_to_cells
 from reference_sim.files.atomic_files import replacing
-from reference_sim.files.given_files import regular
+from reference_sim.given_files import regular
 
 if TYPE_CHECKING:
     import numpy as np

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from reference_sim.files.given_files import regular
+from reference_sim.given_files import regular
 
 PLAIN_KINDS = "biufcSU"  # kinds of types: truths, numbers, text
 

@@ -13,7 +13,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from reference_sim.files.given_files import regular
+from reference_sim.given_files import regular
 from snug.body.skeleton import (
     BODY_JOINTS,
     JOINT,

@@ -10,7 +10,7 @@ from benchmarks.results.row import read_json
 from benchmarks.results.run_folder import RunFolder
 from reference_sim import Material, Trajectory
 from reference_sim.files.array_file import read_arrays, read_pickled_arrays
-from reference_sim.files.given_files import DEEPEST, parse_toml
+from reference_sim.given_files import DEEPEST, parse_toml
 from snug.motion.recording import parse_lines
 
 READERS = {
