@@ -344,21 +344,20 @@ def metric_rows() -> Rows:
 
 def size_rows() -> Rows:
     """Return a heading and a row of each set of sizes, with the steps of SNUG's training."""
-    heads = ("Sizes", "Vertices", "Test motions", "Frames of each", "Steps of SNUG", "Description")
+    heads = ("Sizes", "Vertices", "Test motions", "Frames of each", "Steps of SNUG")
     rows = []
     for preset in PRESETS:
         motions = "all" if preset.test_motions is None else str(preset.test_motions)
         frames = "all" if preset.frames >= ALL else f"at most {preset.frames}"
         sizes = (str(preset.garment_vertices), motions, frames, f"{preset.steps['snug']:,}")
-        rows.append((f"`{preset.name}`", *sizes, preset.description))
+        rows.append((f"`{preset.name}`", *sizes))
     return [heads, *rows]
 
 
 def study_rows() -> Rows:
-    """Return a heading and a row of each study of the package: its question and parts."""
-    studies = {path.stem: read_study(path.stem) for path in sorted(PACKAGED.glob("*.toml"))}
-    rows = [(f"`{name}`", study.question, ", ".join(study.parts)) for name, study in studies.items()]
-    return [("Study", "Question", "Parts"), *rows]
+    """Return a heading and a row of each study of the package: its question."""
+    studies = (path.stem for path in sorted(PACKAGED.glob("*.toml")))
+    return [("Study", "Question"), *((f"`{name}`", read_study(name).question) for name in studies)]
 
 
 def part_rows() -> Rows:
@@ -370,7 +369,7 @@ def part_rows() -> Rows:
 PARTS = {
     "metrics of benchmarks": metric_rows,
     "sizes": size_rows,
-    "studies": study_rows,
+    "studies of benchmarks": study_rows,
     "parts": part_rows,
     "options of benchmarks.run": option_rows,
     "evaluations of published runs": evaluation_rows,
