@@ -12,12 +12,13 @@
 | pose correctives, optional | `posedirs` | (B, 3, 9 (J - 1)) |
 
 J: 24 of SMPL, 52 of SMPL-H, 55 of SMPL-X. Of the latter two, fingers go into the hand, jaw and eyes into
-the head, in weights and skeleton; the hand's joint is the mean of its knuckles. The arms are horizontal,
-since motions are relative to the T pose.
+the head, in weights and skeleton; the hand's joint is the mean of its knuckles. Arms are horizontal and
+legs vertical, since motions are relative to the T pose.
 """
 
 from __future__ import annotations
 
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -31,7 +32,8 @@ from snug.body.skeleton import BODY_JOINTS, JOINT, JOINT_NAMES, PARENTS, BodyErr
 JOINTS = len(JOINT_NAMES)
 FOLDED = {20: JOINT["left_hand"], 21: JOINT["right_hand"], 15: 15}  # what hangs on wrists and head
 MAX_HOLE = 0.15  # [m] around: an eye of SMPL-X is closed, a missing foot is not
-T_POSE = np.radians(10.0)  # up to which arms may hang down
+# Limb, first and last joint: largest angle to the axis x, or to the vertical [degrees].
+LIMITS = {("arm", "shoulder", "wrist"): 10.0, ("leg", "hip", "ankle"): 8.0}
 
 SYNONYMS = {
     "v_template": ("v_template", "vertices", "template"),
@@ -170,7 +172,7 @@ def _joints(
 
 
 def _check_place(template: np.ndarray, joints: np.ndarray) -> None:
-    """Raise BodyError unless this is a person in metres, y up, facing +z, at x = 0, arms horizontal."""
+    """Raise BodyError unless this is a person in metres, y up, facing +z, at x = 0, in T pose."""
     low, high = template.min(axis=0), template.max(axis=0)
     size = high - low
     if not 0.5 < size[1] < 3.0 or max(size) > 3.0:
@@ -190,10 +192,14 @@ def _check_place(template: np.ndarray, joints: np.ndarray) -> None:
         raise BodyError("the left shoulder is not at larger x, or the neck not above; turn it to face +z")
     if abs(at["pelvis"][0]) > 0.05:
         raise BodyError(f"the pelvis is {at['pelvis'][0]:.3g} m beside x = 0; shift the body")
-    for side in ("left", "right"):
-        arm = at[f"{side}_wrist"] - at[f"{side}_shoulder"]
-        if (angle := abs(np.arctan2(arm[1], abs(arm[0])))) > T_POSE:
-            raise BodyError(f"the {side} arm is {np.degrees(angle):.0f} degrees off the T pose; lift it")
+    for (side, out), (limb, near, far) in product((("left", 1), ("right", -1)), LIMITS):
+        bone = at[f"{side}_{far}"] - at[f"{side}_{near}"]
+        straight = out * bone[0] if limb == "arm" else -bone[1]
+        angle = np.degrees(np.arccos(straight / np.linalg.norm(bone)))
+        if not angle <= LIMITS[limb, near, far]:
+            raise BodyError(
+                f"the {side} {limb} is {angle:.0f} degrees off the T pose; pose it so at rest"
+            )
 
 
 def _faces(arrays: Arrays, template: np.ndarray) -> np.ndarray:

@@ -177,9 +177,9 @@ ORDER = ("neck", "waist", "left_sleeve", "right_sleeve", "left_armhole", "right_
 def name_openings(body: Body, positions: Array, faces: Index) -> dict[str, Index]:
     """Return the boundary vertices of each opening by its name, along the winding, front-most first.
 
-    The garment (V,3) [m], (F,3) lies on the unposed body. An opening beside the middle is a sleeve above
-    the hips, or far out, and a leg else; a sleeve that ends near the shoulder's joint is an armhole. In
-    the middle the highest is the neck, above half the way from pelvis to neck, or else the waist, and the
+    The garment (V,3) [m], (F,3) lies on the unposed body. An opening beside the middle is a leg below the
+    hips and a sleeve above; a sleeve that ends near the shoulder's joint is an armhole. In the
+    middle the highest is the neck, above half the way from pelvis to neck, or else the waist, and the
     lowest the hem; one that is alone there is the hem, unless there are legs. The lowest of all is called
     hem too where no other is, but for two legs. Others are opening_1 and so on.
 
@@ -223,7 +223,7 @@ def _name_beside(body: Body, centre: Array) -> str:
         return ""
     arm = float(np.linalg.norm(joint_position(body, "left_elbow") - shoulder))
     beyond = out > shoulder[0] - middle + ARMHOLE * arm
-    limb = "sleeve" if beyond else "armhole" if centre[1] > hip[1] else "leg"
+    limb = "leg" if centre[1] <= hip[1] else "sleeve" if beyond else "armhole"
     return f"{'left' if centre[0] > middle else 'right'}_{limb}"
 
 

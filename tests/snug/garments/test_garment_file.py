@@ -16,7 +16,7 @@ from snug import check
 from snug import train as train_command
 from snug.body.skeleton import JOINT
 from snug.file_options import GarmentFile, parse_garment_file
-from snug.garments.garment import GarmentError
+from snug.garments.garment import GarmentError, name_openings
 from snug.garments.reading import read_garment
 from snug.networks.dressed_body import DressedBody
 from tests.snug.garments.garment_files import doubled_along, own_chart, saved, z_up
@@ -102,6 +102,19 @@ def test_a_skirt_is_held_by_its_waist_and_follows_neither_leg(tmp_path, body):
     assert np.abs(left - right).max() < 0.2 and min(left.min(), right.min()) > 0.2
 
 
+def test_legs_apart_are_no_sleeves_and_what_has_no_waist_does_not_hang(tmp_path, body):
+    trousers = tailored("trousers", 300)
+    x, y, z = trousers.rest_positions.T
+    apart = np.stack([x + 0.6 * np.sign(x) * np.maximum(0.88 - y, 0.0), y, z], axis=1)
+    assert set(name_openings(body, apart, trousers.faces)) == {"waist", "left_leg", "right_leg"}
+    waist = trousers.loops["waist"]
+    first = np.full(len(waist) - 2, waist[0])
+    closed = np.concatenate([trousers.faces, np.stack([first, waist[2:], waist[1:-1]], axis=1)])
+    path = saved(tmp_path, trousers, faces=closed)
+    with pytest.raises(GarmentError, match=r"no waist among its openings \(left_leg, right_leg\)"):
+        read_garment(path, body)
+
+
 def test_its_material_is_that_of_simulator_and_training(tmp_path, body, tube):
     (tmp_path / "silk.toml").write_text("young_modulus = 5e4\nbending_stiffness = 1e-6\n")
     file = GarmentFile(path=saved(tmp_path, tube), material=tmp_path / "silk.toml")
@@ -157,8 +170,9 @@ def test_a_seam_is_joined_but_refused_where_a_program_left_it_open(tmp_path, bod
     )
     with pytest.raises(GarmentError, match=says):
         read_garment(path, body)
-    positions[len(tube.rest_positions) :, 0] -= 0.02  # a slit
-    read_garment(saved(tmp_path, tube, positions=positions, faces=faces), body)
+    positions[len(tube.rest_positions) :, 0] -= 0.02  # a slit, along which it falls off
+    with pytest.raises(GarmentError, match="nothing holds it"):
+        read_garment(saved(tmp_path, tube, positions=positions, faces=faces), body)
 
 
 def test_a_word_that_means_nothing_is_refused():
