@@ -24,7 +24,6 @@ from __future__ import annotations
 
 import math
 import re
-from argparse import SUPPRESS
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -34,7 +33,6 @@ from pathlib import Path
 
 from benchmarks.declarations import attributes_of
 from benchmarks.metrics import declared
-from benchmarks.plan.options import make_parser
 from benchmarks.plan.study import PACKAGED, read_study
 from benchmarks.presets import PRESETS
 from benchmarks.results.run_folder import RunFolder
@@ -42,7 +40,7 @@ from reports.finished_run import Run
 from reports.statistics.effects import RATIO
 from reports.statistics.means_and_spreads import mean_of
 from reports.statistics.outcomes import PUBLISHED, read_published
-from reports.statistics.paper_claims import BEFORE, EXPLORATORY, PRIMARY, Claim, Judged, in_words, judged
+from reports.statistics.paper_claims import EXPLORATORY, PRIMARY, Claim, Judged, in_words, judged
 from reports.statistics.pareto import NETWORK, compared_scenes, fastest, points_of, run_time, truncated
 from reports.statistics.relative_excess import excess_of, with_relative_excess
 from reports.statistics.verdicts import compare_methods, measure_of
@@ -58,7 +56,6 @@ from snug.named_recipes import RECIPES
 TIMED = ("quick",)  # runs with nothing beside them, which judge claims on times
 TIMES = ("s", "ms")  # units
 FAMILIES = {"primary": PRIMARY, "exploratory": EXPLORATORY}
-NOT_MEASURED = "not measured"
 SWING, ALIKE = "dynamics/amplitude", "dynamics/correlation"
 Rows = Sequence[Sequence[str]]
 
@@ -100,38 +97,32 @@ def _words(text: str) -> list[str]:
 
 
 @cache
-def _judged(*folders: Path) -> tuple[dict[Claim, tuple[str, Judged]], dict[str, str], dict[str, str]]:
-    """Return claim -> first run that has both of its methods and its judgement; labels; headings of metrics.
+def _judged(*folders: Path) -> tuple[dict[Claim, tuple[str, Judged]], dict[str, str]]:
+    """Return claim -> first run that has both of its methods and its judgement; labels of methods.
 
     A run that shared its machine with other work judges no claim on times: its methods may have had
     different shares of the processors.
     """
     verdicts: dict[Claim, tuple[str, Judged]] = {}
     labels: dict[str, str] = {}
-    headings = {BEFORE.name: BEFORE.heading}
     for folder in folders:
         run = read_published(folder)
         for line in judged(run):
             if folder.name in TIMED or line.compared.metric.unit not in TIMES:
                 verdicts.setdefault(line.claim, (folder.name, line))
         labels = {method: run.label(method) for method in run.methods} | labels
-        headings |= {metric.name: metric.heading for metric in run.metrics.values()}
-    return verdicts, labels, headings
+    return verdicts, labels
 
 
 def claim_rows(family: str, folders: Sequence[Path]) -> Rows:
-    """Return a heading and a row of each test of a family, judged by these runs or not; each claim once."""
-    verdicts, labels, headings = _judged(*folders)
+    """Return a heading and a row of each test of a family that these runs judge; each claim once."""
+    verdicts, labels = _judged(*folders)
+    left_out = slice(4, 4 if family == "primary" else 5)  # others are shown without p
     rows = [["Claim", "Tested", "Effect", "Interval", "p", "Verdict"]]
     before = ""
-    for claim in FAMILIES[family]:
-        lower, higher = (labels.get(method, method) for method in (claim.lower, claim.higher))
-        relation = f"{lower} {claim.relation} {higher}"
+    for claim in (claim for claim in FAMILIES[family] if claim in verdicts):
+        relation = f"{labels[claim.lower]} {claim.relation} {labels[claim.higher]}"
         says, before = "" if claim.says == before else claim.says, claim.says
-        if claim not in verdicts:
-            heading = headings.get(claim.metric, claim.metric)
-            rows.append([says, f"{heading}: {relation}", DASH, DASH, DASH, NOT_MEASURED])
-            continue
         name, line = verdicts[claim]
         far = line.compared.effect
         effect, interval = DASH, DASH
@@ -142,17 +133,19 @@ def claim_rows(family: str, folders: Sequence[Path]) -> Rows:
         tested = f"{measure_of(line.compared).heading}: {relation}"
         by = "" if name == folders[0].name else f" (`{name}`)"
         rows.append([says, tested, effect, interval, p, line.verdict + line.remark + by])
+    for row in rows:
+        del row[left_out]
     return rows
 
 
 def claim_counts(folders: Sequence[Path]) -> str:
     """Return how many tests of claims came out how, those of the primary ones first."""
-    verdicts, *_ = _judged(*folders)
+    verdicts, _ = _judged(*folders)
     lines = []
     for name, family in FAMILIES.items():
         counts = Counter(verdicts[claim][1].verdict for claim in family if claim in verdicts)
         absent = len(family) - counts.total()
-        missing = [f"{absent} {'is' if absent == 1 else 'are'} {NOT_MEASURED}"] if absent else []
+        missing = [f"{absent} {'is' if absent == 1 else 'are'} not measured"] if absent else []
         lines.append(f"Tests of {name} claims: {', '.join([in_words(counts), *missing])}.")
     return "\n".join(lines)
 
@@ -269,18 +262,6 @@ def _made(folder: Path, name: str) -> Table:
 ALL = 10_000  # frames or more: whole motions
 
 
-def option_rows() -> Rows:
-    """Return a heading and a row of each option of benchmarks.run, with the text of its --help."""
-    parser = make_parser()
-    texts = parser._get_formatter()
-    shown = [action for action in parser._actions if action.option_strings and action.help != SUPPRESS]
-    rows = [
-        (f"`{texts._format_action_invocation(action)}`", texts._expand_help(action).replace("<", "\\<"))
-        for action in shown
-    ]
-    return [("Option", "Meaning"), *(row for row in rows if "--help" not in row[0])]
-
-
 def chosen_rows(rows: Rows, names: Sequence[str]) -> Rows:
     """Return the heading and the rows whose first cells have these names, in their order; all without names.
 
@@ -360,18 +341,10 @@ def study_rows() -> Rows:
     return [("Study", "Question"), *((f"`{name}`", read_study(name).question) for name in studies)]
 
 
-def part_rows() -> Rows:
-    """Return a heading and a row of each part of the studies that are no published run."""
-    parts = read_study("full").parts
-    return [("Part", "Question"), *((f"`{name}`", part.question) for name, part in parts.items())]
-
-
 PARTS = {
     "metrics of benchmarks": metric_rows,
     "sizes": size_rows,
     "studies of benchmarks": study_rows,
-    "parts": part_rows,
-    "options of benchmarks.run": option_rows,
     "evaluations of published runs": evaluation_rows,
     "sources of the library": lambda: list(source_rows()),
 }

@@ -93,7 +93,7 @@ def test_a_part_without_an_end_and_a_part_of_no_form_are_refused(tmp_path):
     with pytest.raises(ValueError, match="known: docstring"):
         published_part("everything of quick")
     for request in (
-        "table nothing of quick", "table overview of quick; colour", "options of benchmarks.run; --seed",
+        "table nothing of quick", "table overview of quick; colour", "metrics of benchmarks; colour",
         "table overview of quick, paper_text; method; snug, nobody",
         "table energies of quick; method; snugg", "table paper_table_1 of quick",
     ):  # fmt: skip
