@@ -22,7 +22,7 @@ from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import OF_SCENES
 from reports.finished_run import Run
 from reports.statistics.effects import DIFFERENCE, RATIO, Effect, effect
-from reports.statistics.means_and_spreads import Mean, means
+from reports.statistics.means_and_spreads import AT_REFERENCE, Mean, means
 from reports.statistics.pareto import REPEATS, TIME, WHOLE
 from reports.statistics.relative_excess import relative_metric, with_relative_excess
 from reports.statistics.verdicts import effect_of, holm
@@ -36,6 +36,7 @@ TIME_TOLERANCE = 0.15  # share of a time or memory that was repeated
 ONCE = 2.0  # factor of a time that was taken once: below it another load of the machine may be the cause
 # share of the median method's value; a smaller difference is none, whatever it is a share of
 FLOOR = 1e-4
+WORST = "cost/frame_worst"  # the time of one frame, which anything else on the machine may have delayed
 SPREADS = 3.0  # times the reference's noise, beyond which an answer that nothing repeats has changed
 
 
@@ -70,11 +71,17 @@ def tolerance_of(metric: Metric) -> float:
     return ENERGY_TOLERANCE if of_energy else TOLERANCE
 
 
-def side(metric: Metric, difference: float) -> str:
-    """Return whether a difference of that sign is worse or better, or just another number."""
-    if metric.lower_is_better is None:
+def side(metric: Metric, before: float, after: float, difference: float) -> str:
+    """Return whether a difference of that sign is worse or better, or just another number.
+
+    What neither side of is better is worse farther from the value that the reference itself has.
+    """
+    if metric.lower_is_better is not None:
+        return WORSE if bool(difference > 0.0) is metric.lower_is_better else BETTER
+    best = AT_REFERENCE.get(metric.name.replace("/common_", "/"))
+    if best is None:
         return OTHER
-    return WORSE if bool(difference > 0.0) is metric.lower_is_better else BETTER
+    return WORSE if abs(after - best) > abs(before - best) else BETTER
 
 
 def size_of(metric: Metric, mean: Mean, new: Mean, far: Effect, p: float | None) -> str:
@@ -139,7 +146,7 @@ def changed_scenes(one: pd.DataFrame, other: pd.DataFrame, metrics: dict[str, Me
     rows = rows[rows["far"].abs() > np.maximum(rows["least"], beyond)]
     return [
         Change(
-            side(metrics[row.metric], row.far), row.scene, row.method, row.metric,
+            side(metrics[row.metric], row.before, row.after, row.far), row.scene, row.method, row.metric,
             f"{number(row.before)} -> {number(row.after)}{_unit(metrics[row.metric])}",
         )
         for row in rows.itertuples()
@@ -236,6 +243,10 @@ def gone(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
 def endings(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
     """Return cells, checks and stress tests that ended well in one run alone; each cell once."""
     both = one.merge(other, on=CELL, suffixes=("", "_other"))
+    off = (both["value_other"] - both["expected"]).abs() > both[
+        "tolerance"
+    ]  # whatever the later run says
+    both.loc[off & (both["status_other"] == "ok"), ["status_other", "reason_other"]] = "failed", "off"
     # A cell that failed has one row, of a metric that it need not have where it ends well.
     cells = _worst(one).merge(_worst(other), on=CELL[:3], suffixes=("", "_other"))
     rows = pd.concat([both, cells], ignore_index=True)
@@ -297,8 +308,13 @@ def compare(
 
     Raises:
         ResultsError: where protocols differ, of the runs or of a cell, or presets, sizes, body or
-            garment, or nothing is shared.
+            garment, nothing is shared, or a results.csv is not of its digest.
     """
+    for run in (one, other):
+        if "results.csv" in run.changed:
+            raise ResultsError(
+                "results.csv of A or B is not as its run wrote it: run.json has its digest"
+            )
     one_protocol((one.protocol, other.protocol), "A and B")
     _demand_same_scenes(one, other)
     cells = [_cells(run) for run in (one, other)]
@@ -323,10 +339,37 @@ def compare(
         raise ResultsError(
             f"{place}: of protocol {differ.iloc[0]} in A, {now} in B: another reference or scene"
         )
-    judged, compared, not_judged = _means(one, *kept, basis=cells[0])
+    drawn = _of_one_seed(*of_metrics)
+    alone = set(drawn[1]["method"])
+    kept = [frame[~(frame["seeded"] & frame["method"].isin(alone))] for frame in kept]
+    judged, compared, not_judged = _means(one, *_without_more_noise(*kept), basis=cells[0])
+    of_one_seed = changed_scenes(*_with_known_zero(one, *drawn, basis=cells[0]), _metrics(one))
     order = (GONE, WORSE, BETTER, OTHER)
-    changes = sorted([*lost, *ended, *judged], key=lambda change: order.index(change.verdict))
+    changes = sorted(
+        [*lost, *ended, *judged, *of_one_seed], key=lambda change: order.index(change.verdict)
+    )
     return Comparison(tuple(changes), compared, not_judged)
+
+
+def _of_one_seed(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:
+    """Return the usable rows, in scenes of both, of networks of which the later run alone has one seed.
+
+    That seed is judged by the prediction interval of those of the earlier run.
+    """
+    rows = [frame[frame["seeded"] & frame["usable"] & (frame["case"] == "")] for frame in (one, other)]
+    before, after = (frame.groupby("method", observed=True)["seed"].nunique() for frame in rows)
+    alone = [name for name in after.index[after == 1] if before.get(name, 0) > 1]
+    rows = [frame[frame["method"].isin(alone)] for frame in rows]
+    keys = [frame.set_index(["scene", "method", "metric"]).index for frame in rows]
+    return [frame[key.isin(rest)] for frame, key, rest in zip(rows, keys, reversed(keys))]
+
+
+def _without_more_noise(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:
+    """Return both; no answer of the later run is less certain than in the earlier: it would hide changes."""
+    least = one.set_index(CELL)["uncertainty"].reindex(other.set_index(CELL).index).fillna(0.0).to_numpy()
+    timed = other["unit"].isin(("s", "ms"))
+    now = other["uncertainty"]
+    return [one, other.assign(uncertainty=now.where(timed | (now <= least), least))]
 
 
 def _demand_same_scenes(one: Run, other: Run) -> None:
@@ -385,7 +428,7 @@ def _means(
     judged = [
         (place, method, metric := known[name], mean, new, _effect(metric, new, mean))
         for (place, method, name), (mean, new) in differ.items()
-        if not mean.seeded or mean.seeds > 1
+        if name != WORST and (not mean.seeded or mean.seeds > 1)
     ]
     p_values = [far.p_value() for *_, far in judged]
     corrected = iter(holm([p for p in p_values if p is not None]))
@@ -401,7 +444,9 @@ def _means(
         elif not _beyond_noise(metric, far, p):
             continue
         size = size_of(metric, mean, new, far, p)
-        changes.append(Change(side(metric, far.value), place, method, metric.name, size))
+        changes.append(
+            Change(side(metric, mean.value, new.value, far.value), place, method, metric.name, size)
+        )
     reported = {(change.place, change.method, change.metric) for change in changes}
     worn = rows[0][rows[0]["place"] != rows[0]["scene"]]
     garments = dict(zip(worn["scene"], worn["place"]))

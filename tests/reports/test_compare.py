@@ -114,7 +114,47 @@ def test_what_the_uncertainty_or_2_percent_covers_is_no_change():
     little, worse = ([times(factor, **SIMULATED)(given) for given in a_run()] for factor in (1.015, 1.1))
     assert found(a_run(), little) == []
     assert found(a_run(), worse) == [("worse", "tshirt", "simulation", "energy/strain")]
-    assert found(a_run(), [replace(given, uncertainty=0.5) for given in worse]) == []
+    unsure, both = ([replace(r, uncertainty=0.5) for r in rows] for rows in (a_run(), worse))
+    assert found(unsure, both) == []
+    # The later run's own uncertainty hides nothing.
+    assert found(a_run(), both) == [("worse", "tshirt", "simulation", "energy/strain")]
+
+
+def test_a_correlation_of_the_other_sign_is_worse():
+    def signed(sign: float) -> list[Row]:
+        values = {(s, seed): sign * (0.8 + 0.01 * seed) for s in SCENES for seed in SEEDS}
+        return [
+            row(s, "snug", "dynamics/correlation", v, seed=k, unit="1") for (s, k), v in values.items()
+        ]
+
+    one, other = signed(1.0), signed(-1.0)
+    assert found(one, other) == [("worse", "tshirt", "snug", "dynamics/correlation")]
+    assert found(other, one) == [("better", "tshirt", "snug", "dynamics/correlation")]
+
+
+def test_one_slow_frame_is_no_change():
+    def timed(worst: float) -> list[Row]:
+        more = {"suite": "speed", "unit": "ms"}
+        return [row("flag", "lbfgs-5", f"cost/{name}", ms, **more)
+                for name, ms in (("frame", 6.0), ("frame_worst", worst))]  # fmt: skip
+
+    assert found(timed(7.0), timed(700.0)) == []
+
+
+def test_a_network_of_one_seed_is_judged_by_the_interval_of_the_seeds_of_the_earlier_run():
+    later = [given for given in a_run(1) if given.seed == 0]
+    assert not fails(a_run(0), [*later, *(r for r in a_run(1) if r.seed)])
+    assert found(a_run(0), later, shared=True) == []
+    worse = found(a_run(0), [times(3.0, **STRAIN)(given) for given in later], shared=True)
+    assert worse and {(verdict, *rest) for verdict, _, *rest in worse} == {
+        ("worse", "snug", "energy/strain")
+    }
+
+
+def test_a_check_off_by_more_than_its_tolerance_is_worse_whatever_it_says():
+    for more in ({}, {"tolerance": 5e-3}):
+        later = [replace(r, value=0.284, **more) if r.scene == "sag" else r for r in a_run()]
+        assert found(a_run(), later) == [("worse", "sag", "simulation", "check")]
 
 
 @pytest.mark.parametrize(("spread", "factors"), [(3.0, (1.15, 1.25)), (12.0, (1.17, 1.5))])
@@ -207,3 +247,10 @@ def test_exit_status_and_lines(tmp_path, capsys):
 def test_bad_input_is_one_line_and_status_2(tmp_path, refused, b, options):
     run_folder(tmp_path / "a", a_run())
     refused("reports.compare: ", command.main, [str(tmp_path / "a"), str(tmp_path / b), *options])
+
+
+def test_rows_that_are_not_of_the_digest_of_their_run_are_refused(tmp_path, refused):
+    for name in "ab":
+        run_folder(tmp_path / name, a_run(), digests={"results.csv": "0" * 16})
+    says = "results.csv of A or B is not as its run wrote it"
+    refused(says, command.main, [str(tmp_path / "a"), str(tmp_path / "b")])
