@@ -19,6 +19,7 @@ PROGRAM = "benchmarks.export"
 EXAMPLES = """examples:
   python -m benchmarks.export tshirt/kick -o kick
   python -m benchmarks.export hanging_sheet --set sizes=smoke -o sheet --reference
+  python -m benchmarks.export tshirt/kick --for hood -o kick     and kick/hood, with the commands to run there
   python -m benchmarks.export tshirt/01_01 --motions clips/ --test-motions 01_01 --body mine.npz -o out
   python -m benchmarks.export tshirt/training-motions -o motions.h5    training motions, simulated, in a file
   python -m benchmarks.score mine.npz --scene tshirt/kick        what came of it, judged
@@ -42,14 +43,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     add = parser.add_argument
     add("scene", metavar="SCENE", help="as in benchmarks.run --list, or GARMENT/training-motions")
-    add(
-        "-o",
-        "--out",
-        required=True,
-        metavar="DIR",
-        help="a new or empty folder; of training motions a file",
-    )
+    add("-o", "--out", required=True, metavar="DIR",
+        help="a new or empty folder; of training motions a file")  # fmt: skip
     add("--reference", action="store_true", help="simulate the scene, and write the trajectory too")
+    add("--for", dest="reader", choices=("hood", "contourcraft", "ncs"), default="",
+        help="write what the public code of that method reads, too")  # fmt: skip
     add_study_options(parser)
     options = parser.parse_args(arguments)
     folder = Path(options.out)
@@ -70,7 +68,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         from benchmarks.external.scene_files import write_scene  # loads the simulator
 
         simulation = find_method("simulation").make(models=folder, seed=0) if options.reference else None
-        write_scene(folder, plan.scenes[0], scene, preset=plan.study.sizes.name, simulation=simulation)
+        write_scene(
+            folder, plan.scenes[0], scene, preset=plan.study.sizes.name, simulation=simulation,
+            reader=options.reader,
+        )  # fmt: skip
     except RuntimeError as error:  # a simulation that did not stay finite
         raise StudyError(str(error)) from error
     print(f"{scene.name}: {scene.frames} frames of {scene.cloth.vertex_count} vertices in {folder}")

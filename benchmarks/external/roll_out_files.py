@@ -124,7 +124,7 @@ def read_roll_out(path: str | Path) -> StoredRollOut:
         return _checked(_READERS.get(suffix, _meshes)(path))
     except (
         Exception
-    ) as error:  # a damaged file can fail in nearly every way, and none is this program's own
+    ) as error:  # a damaged file fails in nearly every way, none of them this program's own
         why = " ".join(str(error).split())[:300] or type(error).__name__
         raise RollOutFileError(why if path in why else f"{path}: {why}") from None
 

@@ -9,27 +9,24 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from reference_sim import Trajectory
+from benchmarks.external.other_methods import write_for
 from reference_sim.files.atomic_files import new_folder
 from reference_sim.material import GRAVITY
-from reference_sim.trajectory import write_obj, write_point_cache
+from reference_sim.trajectory import write_obj
 
 if TYPE_CHECKING:
     from benchmarks.method import Method
     from benchmarks.scene import BuiltScene, Dressed, Scene
 
-FINGERS = 30  # joints of SMPL-H's hands, which a garment never meets
-# (x, y, z) with y up -> (x, -z, y) with z up.
-Z_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
 README = """\
 Scene {scene}, sizes {preset}: {description}.
 
 Units: metres, kilograms, seconds, radians, joules. World coordinates, right-handed, y up; a body
-faces +z in its rest pose. motion_amass.npz alone has z up. Gravity is 9.81 m/s^2 along -y.
+faces +z in its rest pose. Gravity is 9.81 m/s^2 along -y.
 Order of vertices: that of rest.obj, the same in every file. Triangles wind outwards.
 Time: {frames} frames at {rate} a second (dt {dt:.6g} s); frame 0 is the start:
 start_positions and start_velocities. The first {warm_up_frames} frames are simulated and not judged.
-pc2 files hold float32, all others float64 with all digits.
+All numbers are float64 with all digits.
 
 Files, as far as the scene has what they hold:
   scene.json         step, material, terms of the energy with their constants
@@ -41,15 +38,13 @@ Files, as far as the scene has what they hold:
                      docs/scene-files.md
   obstacle.npz       positions (T,B,3) of what the cloth touches, one frame where it stands still, faces;
                      rest_positions (B,3), the body unposed
-  obstacle.pc2, .obj the same, and its first frame
   motion_smpl.npz    poses (T,72) [rad], trans (T,3), betas, fps: SMPL's 24 joints, y up. Of a part of a
                      motion poses_before, trans_before, the frames until then: the start has the
                      velocities with which a simulation of them ends
-  motion_amass.npz   the same as AMASS writes it: poses (T,156), z up, fingers at rest
   skinning.npz       weights (V,24) of the garment, smoothed_weights as method 'skinning' takes them,
                      rest_positions (V,3) on this body, joints (24,3), parents (24,), transforms
                      (T,24,3,4) of the joints, loops
-  reference.vtkhdf, .npz, .pc2, .obj   the simulation of the scene
+  reference.vtkhdf, .npz   the simulation of the scene
 
 With a body:
 A vertex p at rest goes to sum_j w_j (R_j p + t_j), (R_j, t_j) = transforms. The motion is
@@ -85,8 +80,6 @@ def write_scene_files(part: Path, scene: BuiltScene, facts: dict[str, Any]) -> N
     }
     _write_arrays(part / "energies.npz", **arrays)
     if obstacle is not None:
-        times = np.arange(len(obstacle.positions)) * scene.dt
-        write_point_cache(part / "obstacle.pc2", Trajectory(obstacle.positions, obstacle.faces, times))
         _write_arrays(
             part / "obstacle.npz", positions=obstacle.positions, faces=obstacle.faces, fps=1.0 / scene.dt,
             rest_positions=None if worn is None else worn.body.shaped(worn.betas),
@@ -102,8 +95,7 @@ def _write_arrays(path: Path, **arrays: Any) -> None:
 
 
 def write_motion(part: Path, worn: Dressed) -> None:
-    """Write the poses in two layouts, and the skinning of the garment."""
-    from snug.body.skeleton import axis_angles, rotation_matrices
+    """Write the poses, and the skinning of the garment."""
     from snug.networks.dressed_body import DressedBody
     from snug.recipe import DEFAULT
 
@@ -115,14 +107,6 @@ def write_motion(part: Path, worn: Dressed) -> None:
         betas=betas, fps=motion.fps,
         poses_before=None if before is None else before.poses.reshape(before.frames, -1),
         trans_before=None if before is None else before.translations,
-    )  # fmt: skip
-    poses = np.zeros((frames, 22 + FINGERS, 3))
-    poses[:, :22] = motion.poses[:, :22]
-    poses[:, 0] = axis_angles(Z_UP @ rotation_matrices(motion.poses[:, 0]))
-    _write_arrays(
-        part / "motion_amass.npz", poses=poses.reshape(frames, -1), betas=np.pad(betas, (0, 6)),
-        trans=(joints[0] + motion.translations) @ Z_UP.T - joints[0],
-        gender=np.array("neutral"), mocap_framerate=motion.fps,
     )  # fmt: skip
     smoothed = DressedBody(body, garment).weights(DEFAULT.smoothing).double().numpy()
     _write_arrays(
@@ -138,18 +122,12 @@ def facts_of(scene: BuiltScene) -> dict[str, Any]:
     material = scene.cloth.material
     return {
         "scene": scene.name,
-        "units": "m, kg, s, rad",
-        "up": "y",
         "frames": scene.frames,
         "dt": scene.dt,
         "fps": 1.0 / scene.dt,
         "substeps": scene.substeps,
         "warm_up_frames": scene.warm_up,
         "vertices": scene.cloth.vertex_count,
-        "triangles": len(scene.cloth.faces),
-        "before": 0
-        if scene.dressed is None or scene.dressed.before is None
-        else scene.dressed.before.frames,
         "gravity": [0.0, -GRAVITY, 0.0],
         "material": asdict(material)
         | {"lame_lambda_N_per_m": material.lame_lambda, "lame_mu_N_per_m": material.lame_mu},
@@ -160,14 +138,15 @@ def facts_of(scene: BuiltScene) -> dict[str, Any]:
 
 
 def write_scene(
-    folder: Path, declared: Scene, scene: BuiltScene, *, preset: str, simulation: Method | None
-) -> None:
+    folder: Path, declared: Scene, scene: BuiltScene, *, preset: str, simulation: Method | None,
+    reader: str = "",
+) -> None:  # fmt: skip
     """Write a scene, as declared and as built by the sizes of a preset, into a new or empty folder.
 
-    The trajectory of `simulation` is written too.
+    The trajectory of `simulation` is written too, and what the method `reader` reads in a folder of its name.
 
     Raises:
-        ValueError: where a simulation is asked for of a scene for networks alone.
+        ValueError: where a simulation is asked for of a scene for networks alone, or a reader's has no body.
         RuntimeError: where the garment does not settle.
     """
     if simulation is not None and declared.networks_only:
@@ -178,11 +157,12 @@ def write_scene(
             "motion": declared.motion, "part": declared.part,
         }  # fmt: skip
         write_scene_files(part, scene, facts)
+        if reader:
+            write_for(reader, part / reader, scene)
         if simulation is not None:
             simulation.prepare(scene)
             trajectory = simulation.run()
             trajectory.save(part / "reference.vtkhdf")
-            write_point_cache(part / "reference.pc2", trajectory)
             positions, faces = trajectory.positions, trajectory.faces
             np.savez(part / "reference.npz", positions=positions, faces=faces, fps=1.0 / scene.dt)
         text = README + (NOT_SCORED if declared.networks_only else SCORED)

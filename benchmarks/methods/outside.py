@@ -11,7 +11,7 @@ import os
 import shlex
 import subprocess
 import tempfile
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -36,21 +36,16 @@ from reference_sim.trajectory import Trajectory
 
 @dataclass
 class Stored(Method):
-    """Positions of a file, once they have been shown to belong to the scene; fields as of a RollOutOption."""
+    """Positions of a file, once they have been shown to belong to the scene; stated: of a RollOutOption."""
 
     path: str
-    units: str = "m"
-    up: str = "y"
-    fps: float | None = None
-    other_mesh: bool = False
+    stated: dict[str, Any] = field(default_factory=dict)
 
     def prepare(self, scene: BuiltScene) -> None:
         """Read the file and compare it with the scene. Raises RollOutFileError."""
         self.scene, stored = scene, read_roll_out(self.path)
         try:
-            self.stored = fit_to_scene(
-                stored, scene, units=self.units, up=self.up, fps=self.fps, other_mesh=self.other_mesh
-            )
+            self.stored = fit_to_scene(stored, scene, **self.stated)
         except RollOutFileError as error:
             raise RollOutFileError(f"{self.path}: {error}") from None
 
@@ -60,7 +55,7 @@ class Stored(Method):
 
     def quasi_static(self) -> Trajectory | None:
         """Return the quasi-static solutions of the file; None where it has none."""
-        held = None if self.other_mesh else self.stored.quasi_static
+        held = None if self.stated.get("other_mesh") else self.stored.quasi_static
         return None if held is None else self._trajectory(held)
 
     def _trajectory(self, positions: np.ndarray) -> Trajectory:
@@ -72,7 +67,7 @@ class Stored(Method):
         )
         return Trajectory(
             positions=positions,
-            faces=np.asarray(stored.faces if self.other_mesh else self.scene.cloth.faces),
+            faces=np.asarray(stored.faces if self.stated.get("other_mesh") else self.scene.cloth.faces),
             times=np.arange(len(positions)) * self.scene.dt,
             status="diverged" if where else "ok",
             reason=f"{self.path}: {where}: a position is not finite" if where else "",
@@ -83,7 +78,7 @@ class Stored(Method):
 
 def make_stored(*, models: Path, seed: int, path: str, digest: str, **stated: Any) -> Stored:
     """Make the roll-out of that file, without seed or model; digest: of its content, for the cache."""
-    return Stored(path, **stated)
+    return Stored(path, stated)
 
 
 def entry_of(option: RollOutOption, scene: str) -> MethodEntry | None:

@@ -26,8 +26,6 @@ from benchmarks.scene import Dressed
 from reference_sim import Trajectory
 from reference_sim.files.mesh_files import read_mesh
 from reference_sim.trajectory import write_obj
-from snug.file_options import MotionFileOptions
-from snug.motion.files import read_motion
 from snug.networks.dressed_body import DressedBody
 from tests.benchmarks.runner.tasks_by_hand import assets_of, dressed_scene, prepared
 from tests.snug.training.dressing import swaying, tube_dress
@@ -55,24 +53,23 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
         return dict(stored)
 
 
-def skinned_elsewhere(folder: Path, motion: str, turn: np.ndarray) -> np.ndarray:
-    """Linear blend skinning from the exported files alone. turn: from the motion's axes to y up."""
-    given, moved = arrays(folder / "skinning.npz"), arrays(folder / motion)
+def skinned_elsewhere(folder: Path) -> np.ndarray:
+    """Linear blend skinning from the exported files alone."""
+    given, moved = arrays(folder / "skinning.npz"), arrays(folder / "motion_smpl.npz")
     joints, parents = given["joints"], given["parents"]
     frames = len(moved["poses"])
     vectors = moved["poses"].reshape(frames, -1, 1, 3)
     local = expm(np.cross(np.eye(3), vectors))  # the matrix exponential turns them into rotations
     world, at = np.empty((frames, 24, 3, 3)), np.empty((frames, 24, 3))
     for j, parent in enumerate(parents):
-        rotation = local[:, j] if j < 22 or motion == "motion_smpl.npz" else np.eye(3)[None]
         if parent < 0:
-            world[:, j], at[:, j] = rotation, joints[j] + moved["trans"]
+            world[:, j], at[:, j] = local[:, j], joints[j] + moved["trans"]
         else:
-            world[:, j] = world[:, parent] @ rotation
+            world[:, j] = world[:, parent] @ local[:, j]
             at[:, j] = at[:, parent] + world[:, parent] @ (joints[j] - joints[parent])
-    local = given["rest_positions"][:, None] - joints  # (V,24,3)
-    placed = np.einsum("tjab,vjb->tvja", world, local) + at[:, None]
-    return np.einsum("vj,tvja->tva", given["smoothed_weights"], placed) @ turn.T
+    offsets = given["rest_positions"][:, None] - joints  # (V,24,3)
+    placed = np.einsum("tjab,vjb->tvja", world, offsets) + at[:, None]
+    return np.einsum("vj,tvja->tva", given["smoothed_weights"], placed)
 
 
 def rows_beside(scene, entry) -> dict:
@@ -99,7 +96,7 @@ def test_skinning_made_elsewhere_and_scored_gives_the_numbers_of_the_method(home
         np.savez(tmp_path / "mine.npz", **arrays)
         return rows_beside(scene, entry_of(RollOutOption("mine", str(tmp_path / "mine.npz")), scene.name))
 
-    elsewhere = skinned_elsewhere(folder, "motion_smpl.npz", np.eye(3))
+    elsewhere = skinned_elsewhere(folder)
     assert np.abs(elsewhere - inside).max() < 1e-6  # the method computes in float32
     metrics = rows_of_file(positions=elsewhere, fps=30.0, quasi_static=elsewhere)
     assert metrics.keys() == expected.keys() and len(metrics) > 20
@@ -155,17 +152,8 @@ def test_the_authors_network_is_given_what_it_reads_in_its_order(home, tmp_path)
     written = arrays(tmp_path / "out.npz")
     velocities = np.diff(motion["trans"], axis=0, prepend=motion["trans"][:1]) * written["fps"]
     moving = 0.001 * np.arange(len(velocities))[:, None, None] * velocities[:, None]
-    expected = skinned_elsewhere(folder, "motion_smpl.npz", np.eye(3)) + moving
+    expected = skinned_elsewhere(folder) + moving
     assert np.abs(written["positions"] - expected).max() < 1e-5
-
-
-def test_the_motion_as_amass_has_it_is_the_same_motion(home):
-    folder, _ = home
-    y_up = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.0, -1.0, 0.0]])
-    turned = skinned_elsewhere(folder, "motion_amass.npz", y_up)
-    assert np.abs(turned - skinned_elsewhere(folder, "motion_smpl.npz", np.eye(3))).max() < 1e-12
-    read = read_motion(folder / "motion_amass.npz", MotionFileOptions())
-    assert np.abs(read.poses[:, :20] - swaying(12).poses[:, :20]).max() < 1e-12 and read.fps == 30.0
 
 
 def test_what_is_exported_is_the_scene(home):
@@ -200,7 +188,7 @@ def test_energies_and_curvature_follow_from_the_exported_files_alone(home, name)
     """In numpy, by the example of the documents, which shares nothing with the project's code."""
     folder, scene = home
     if name == "sunk":  # vertices of all depths, some of them below skin that they must not meet
-        positions = skinned_elsewhere(folder, "motion_smpl.npz", np.eye(3))
+        positions = skinned_elsewhere(folder)
         positions += np.random.default_rng(0).normal(0, 0.03, positions.shape)
     else:
         positions = prepared(name, scene).run().positions
