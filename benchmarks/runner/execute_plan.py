@@ -43,9 +43,14 @@ def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) ->
     """Run the plan, with its assets where they have been made; then make its report unless that is unwanted.
 
     Returns 0 when all ended well, 1 when something failed or there is no report. Raises RunRefused where
-    the plan's cluster is gone.
+    the plan's cluster is gone, or no network in the files that it names is of its meshes and motions.
     """
     tasks = tasks_of(plan)
+    networks = [task for task in tasks if task.kind == "network"]
+    if networks and all(task.skip for task in networks):
+        # What else runs is there to be compared with them.
+        if given := [task for task in networks if task.inputs.get("file")]:
+            raise RunRefused(given[0].skip)
     log = RunLog(plan)
     runner = Runner(tasks, log.cache)
     if plan.garments:

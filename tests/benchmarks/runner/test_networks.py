@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 import torch
 
+from benchmarks import run
 from benchmarks.method import Training
 from benchmarks.methods import find_method
 from benchmarks.plan.cell import Cell
@@ -180,3 +181,8 @@ def test_a_training_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
     )
     assert all(torch.equal(one[name], other[name]) for name in one)
     assert [path.name for path in models.iterdir()] == ["snug-seed0.safetensors"]
+
+
+def test_weights_of_another_mesh_are_refused_before_anything_is_simulated(tmp_path, refused):
+    words = "--scenes tshirt/01_01_a --methods snug,skinning --set sizes=smoke --trained -o"
+    refused("a network of another training (assets, ", run.main, [*words.split(), str(tmp_path / "out")])
