@@ -47,10 +47,9 @@ def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) ->
     """
     tasks = tasks_of(plan)
     networks = [task for task in tasks if task.kind == "network"]
-    if networks and all(task.skip for task in networks):
-        # What else runs is there to be compared with them.
-        if given := [task for task in networks if task.inputs.get("file")]:
-            raise RunRefused(given[0].skip)
+    given = [task for task in networks if task.inputs.get("file")]
+    if given and all(task.skip for task in networks):
+        raise RunRefused(given[0].skip)  # all else is there to be compared with them
     log = RunLog(plan)
     runner = Runner(tasks, log.cache)
     if plan.garments:

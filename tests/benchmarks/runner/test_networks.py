@@ -183,6 +183,7 @@ def test_a_training_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
     assert [path.name for path in models.iterdir()] == ["snug-seed0.safetensors"]
 
 
-def test_weights_of_another_mesh_are_refused_before_anything_is_simulated(tmp_path, refused):
+def test_weights_of_another_mesh_are_refused_before_anything_is_simulated(tmp_path, capsys):
     words = "--scenes tshirt/01_01_a --methods snug,skinning --set sizes=smoke --trained -o"
-    refused("a network of another training (assets, ", run.main, [*words.split(), str(tmp_path / "out")])
+    assert run.main([*words.split(), str(tmp_path)]) == 2 and not list(tmp_path.rglob("*.*"))
+    assert "a network of another training (assets, " in capsys.readouterr().err
