@@ -118,41 +118,6 @@ NAMED = (
 )  # fmt: skip
 
 
-def _floor(name: str, label: str, space: str, **fields: Any) -> MethodEntry:
-    """Declare the simulation within what a network can express. Its time is not that of a network."""
-    return MethodEntry(
-        name=f"{name}-floor", label=label,
-        description=f"no network: each time step minimised over {space}",
-        module="benchmarks.methods.lower_bounds:make_floor", needs_body=True, gives_first_frame=True,
-        static_known=False, timed=False, role="solver",
-        **{"reporting": Reporting(base=name, pairing_group=name)} | fields,
-    )  # fmt: skip
-
-
-FLOORS = (
-    *(
-        _floor(
-            f"handles-{count}", f"Floor of {count} handles", f"the transforms of {count} handles",
-            options={"handles": count},
-            reporting=Reporting(
-                family="handles-floor", level=count, base=f"handles-{count}", pairing_group="handles"
-            ),
-        )
-        for count in COUNTS
-    ),
-    *(
-        _floor(
-            name, f"Floor of {label}", f"all that {space} can give", options={"network": name},
-            trained=name, seeded=seeded,
-        )
-        for name, label, space, seeded in (
-            ("snug", "SNUG", "SNUG's last layer", True),
-            ("pbns", "PBNS", "PBNS's last layer", True),
-            ("pose-regression", "principal components", "64 principal components of the offsets", False),
-        )
-    ),
-)  # fmt: skip
-
 POST_PROCESSED = tuple(
     replace(
         entry, name=f"{entry.name}+cleanup", label=f"{entry.label}, post-processed", batched=False,
@@ -163,16 +128,6 @@ POST_PROCESSED = tuple(
     for entry in NAMED
     if entry.name in ("snug", "supervised", "supervised-vertices")
 )  # fmt: skip
-
-DIRECT_OPTIMISATION = MethodEntry(
-    name="direct-optimisation",
-    label="Vertices optimised directly",
-    description="no network: the vertices of a whole clip optimised directly, the least energy found",
-    module="benchmarks.methods.lower_bounds:make_direct_optimisation",
-    needs_body=True,
-    gives_first_frame=True,
-    role="bound",
-)
 
 _LABELS = {
     "no-noise": "first states of zero",
@@ -237,4 +192,4 @@ EQUAL_DATA = tuple(
     for mixed in numbers
 )
 
-NETWORKS = (*NAMED, *FLOORS, *RECIPES, *POST_PROCESSED, DIRECT_OPTIMISATION, *EQUAL_DATA)
+NETWORKS = (*NAMED, *RECIPES, *POST_PROCESSED, *EQUAL_DATA)

@@ -1,6 +1,4 @@
-"""Lower bounds: a clip's vertices optimised directly, and steps minimised over what a network can express.
-
-Vertices of a whole clip are optimised under the training loss, without a network,
+"""Direct optimisation: the vertices of a whole clip under the training loss, without a network.
 
     min over x_1 ... x_T of  sum_t [strain + bending + gravity + collision](x_t)
                              + sum_{t >= 3} inertia(x_t),
@@ -8,46 +6,31 @@ Vertices of a whole clip are optimised under the training loss, without a networ
 
 which a network could reach whose output were not bound to its input. The sum is not convex: the bound is
 found from skinning, by L-BFGS in rounds of frozen contact planes, and not proven to be the lowest.
-
-The floor of a subspace is the simulation, from its own past and with its own contact planes, whose cloth
-can only do what the subspace expresses: handles, or all that the last layer of a network can give,
-
-    x_v(q) = M_v (r_v + m_v + sum_k U_vk q_k)
-
-with skinning M, the unposed garment r and its offsets m + U q.
-No training removes the excess of this floor over the reference.
 """
 
 from __future__ import annotations
 
-import dataclasses
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
-from functools import partial
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from benchmarks.method import Method
-from benchmarks.methods.simulation import Simulation
-from benchmarks.results.run_folder import model_path
-from benchmarks.scene import BuiltScene
+from benchmarks import BuiltScene, Method, MethodEntry
 from benchmarks.scenes.dressed_body import declared_energies
-from reference_sim.cloth import Cloth
-from reference_sim.energies.contact_penalty import ContactPenalty
-from reference_sim.energies.energy import Energy
-from reference_sim.energies.gravity import Gravity
-from reference_sim.energies.inertia import Inertia
+from reference_sim import Cloth, Potential, Trajectory
+from reference_sim.energies import ContactPenalty, Energy, Gravity, Inertia
 from reference_sim.minimise.minimisers import make_minimiser
-from reference_sim.minimise.subspace import Placement, SubspaceNewton, nearest_offsets, orthonormal
-from reference_sim.potential import Potential
-from reference_sim.trajectory import Trajectory
-from snug.networks.dressed_body import DressedBody
-from snug.networks.handles import shape_functions, span
-from snug.networks.trained_model import TrainedModel
-from snug.recipe import DEFAULT
 
+METHODS = (
+    MethodEntry(
+        name="direct-optimisation",
+        label="Vertices optimised directly",
+        description="no network: the vertices of a whole clip optimised directly, the least energy found",
+        needs_body=True,
+        gives_first_frame=True,
+        role="bound",
+    ),
+)
 ROUNDS, ITERATIONS, MEMORY = 40, 50, 20
 FALL = 1e-4  # a round that lowers the sum by a smaller share is the last
 TOLERANCE = 1e-4  # largest component of the gradient, in mean vertex weights
@@ -177,81 +160,6 @@ def _by_kind(values: np.ndarray, contact: ContactPenalty) -> np.ndarray:
     return np.ascontiguousarray(np.concatenate(parts))
 
 
-def make_direct_optimisation(*, models: Path, seed: int) -> DirectOptimisation:
+def make(*, models: Path, seed: int) -> DirectOptimisation:
     """Make the bound; it has no seed and no model."""
     return DirectOptimisation()
-
-
-Space = tuple[np.ndarray, np.ndarray, int]  # U (3 V, K), m (3 V,) [m], sweeps over the skinning weights
-
-
-@dataclass(kw_only=True)
-class SubspaceFloor(Simulation):
-    """Simulation within the subspace of offsets that `space` makes for a dressed body."""
-
-    space: Callable[[DressedBody], Space]
-
-    def prepare(self, scene: BuiltScene) -> None:
-        """Pose the subspace in each frame, start from its point nearest to the scene's start, compile.
-
-        Raises ValueError for a scene of several steps a frame: there is a pose for its last alone.
-        """
-        if scene.substeps > 1:
-            raise ValueError(f"scene {scene.name} has {scene.substeps} steps a frame, poses are of one")
-        assert scene.dressed is not None
-        dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
-        columns, centre, smoothing = self.space(dressed)
-        vertices = dressed.vertices
-        basis = orthonormal(columns).reshape(vertices, 3, -1)
-        placements = _placements(dressed, scene, centre.reshape(vertices, 3), smoothing)
-        offsets = nearest_offsets(basis, placements[0].unposed(scene.start))
-        start = placements[0].posed(offsets)
-        start[scene.cloth.pins] = scene.start[scene.cloth.pins]
-
-        # No `partial`: a trajectory's provenance would hold its arrays.
-        def in_subspace(potential: Potential, **options: Any) -> SubspaceNewton:
-            further: dict[str, Any] = {"offsets": offsets, **options}
-            return SubspaceNewton(potential, basis=basis, placements=placements[1:], **further)
-
-        self.options = {"method": in_subspace}
-        state = np.stack([start, scene.start_velocity])
-        super().prepare(dataclasses.replace(scene, settle=lambda: state))
-
-
-def _placements(
-    dressed: DressedBody, scene: BuiltScene, centre: np.ndarray, smoothing: int
-) -> list[Placement]:
-    """Return turns and places of the vertices in each frame, with offsets `centre` (V, 3) [m]."""
-    assert scene.dressed is not None
-    motion, betas = scene.dressed.motion, scene.dressed.betas
-    weights = dressed.weights(smoothing).double().numpy()
-    transforms = dressed.transforms(motion.poses, betas).double().numpy()
-    unposed = dressed.rest(betas).double().numpy() + centre
-    placements = []
-    for joints, pelvis in zip(transforms, dressed.pelvis(motion, betas)):
-        blended = np.einsum("vj,jik->vik", weights, joints)
-        turns = np.ascontiguousarray(blended[..., :3])
-        placements.append(
-            Placement(turns, np.einsum("vij,vj->vi", turns, unposed) + blended[..., 3] + pelvis)
-        )
-    return placements
-
-
-def _handle_space(dressed: DressedBody, *, count: int) -> Space:
-    functions = shape_functions(dressed.garment, count)
-    return span(functions), np.zeros(3 * dressed.vertices), DEFAULT.smoothing
-
-
-def _last_layer(dressed: DressedBody, *, path: Path) -> Space:
-    model = TrainedModel.load(path)
-    basis, centre = (part.double().numpy().copy() for part in model.network.offset_space())
-    rows = (3 * np.asarray(model.network.pins, dtype=np.int64)[:, None] + np.arange(3)).ravel()
-    basis[rows], centre[rows] = 0.0, 0.0
-    return basis, centre, model.recipe.smoothing
-
-
-def make_floor(*, models: Path, seed: int, handles: int = 0, network: str = "") -> SubspaceFloor:
-    """Make the floor of so many handles, or that of the last layer of a network."""
-    if not network:
-        return SubspaceFloor(space=partial(_handle_space, count=handles))
-    return SubspaceFloor(space=partial(_last_layer, path=model_path(models, network, seed)))

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 
 from benchmarks.metrics.energy import copied_terms, freeze_step
+from benchmarks.plan.user_files import METHODS, entries_of
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import model_path
 from reference_sim import Potential, minimise
@@ -23,6 +25,7 @@ from tests.benchmarks.runner.tasks_by_hand import assets_of, dressed_scene, prep
 from tests.snug.training.dressing import swaying, tube_dress
 
 FRAMES = 5
+FLOORS = {entry.name: entry for entry in entries_of(METHODS, str(Path(__file__).with_name("floors.py")))}
 
 
 @pytest.fixture(scope="module")
@@ -34,7 +37,7 @@ def scene():
 
 @pytest.fixture(scope="module")
 def floor(scene):
-    return prepared("handles-20-floor", scene).run()
+    return prepared(FLOORS["handles-20-floor"], scene).run()
 
 
 def unposed(scene, positions) -> np.ndarray:
@@ -81,7 +84,7 @@ def test_every_step_is_a_minimum_within_the_handles_and_above_that_of_all_vertic
 
 
 def test_more_handles_have_less_energy(scene, floor):
-    finer = prepared("handles-40-floor", scene).run()
+    finer = prepared(FLOORS["handles-40-floor"], scene).run()
     assert finer.status == "converged"
 
     def energy(trajectory):
@@ -97,7 +100,7 @@ def test_the_floor_of_a_network_lies_in_the_span_of_its_last_layer(scene, tmp_pa
         "pbns", 141, vertices, dataclasses.replace(DEFAULT, zero_last_layer=False), seed=0
     )
     TrainedModel("pbns", network, DEFAULT).save(model_path(tmp_path, "pbns", 0))
-    floor = prepared("pbns-floor", scene, tmp_path).run()
+    floor = prepared(FLOORS["pbns-floor"], scene, tmp_path).run()
     assert floor.status == "converged"
     columns, _ = network.offset_space()
     assert left_over(columns.double().numpy(), unposed(scene, floor.positions)) < 1e-6

@@ -9,9 +9,9 @@ import pytest
 import torch
 
 from benchmarks.assets import open_assets
-from benchmarks.methods.lower_bounds import ClipInertia, DirectOptimisation
 from benchmarks.metrics.energy import energy_series
 from benchmarks.presets import find_preset
+from direct_optimisation import ClipInertia, DirectOptimisation
 from reference_sim.cloth import Cloth
 from reference_sim.energies import ContactPenalty, Inertia
 from tests.benchmarks.runner.tasks_by_hand import dressed_scene, prepared
@@ -80,8 +80,8 @@ def test_the_bound_is_far_below_skinning_and_below_a_simulation(scene, bound):
 
 def test_a_bound_that_still_falls_is_no_bound_yet(scene, bound, monkeypatch):
     assert bound[1].status == "ok"
-    monkeypatch.setattr("benchmarks.methods.lower_bounds.ROUNDS", 1)
-    monkeypatch.setattr("benchmarks.methods.lower_bounds.ITERATIONS", 2)
+    monkeypatch.setattr("direct_optimisation.ROUNDS", 1)
+    monkeypatch.setattr("direct_optimisation.ITERATIONS", 2)
     method = DirectOptimisation()
     method.prepare(scene)
     trajectory = method.run()

@@ -9,7 +9,7 @@ from torch.autograd import functional
 
 from reference_sim import Cloth, Potential
 from reference_sim.energies import BendHinge, Gravity, Inertia, StretchStVK
-from reference_sim.minimise.subspace import (
+from subspace import (
     Placement,
     SubspaceHessian,
     SubspaceNewton,
