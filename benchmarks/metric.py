@@ -30,7 +30,7 @@ Positions = Floats  # (T,V,3) [m] of a roll-out
 Vertices = Floats  # (V,3) [m] of a frame
 Faces = NDArray[np.int64]  # (F,3) triangles, outward
 NUMBERS_OF = ("answer", "method", "machine")
-COMPARED_WITH = ("reference", "reference-variant", "bound")  # roles of what others are measured beside
+COMPARED_WITH = ("reference", "reference-variant")  # roles of what others are measured beside
 
 
 class Estimate(NamedTuple):

@@ -20,7 +20,7 @@ from reports.tables.table import Cell, Column, Table
 ENTRIES, PAGE = "submissions", "index.html"
 SCRIPTS = ("tables", "entries")  # in this order
 DYNAMICS, PENETRATION, TIME = "dynamics/common_correlation", "penetration/surface", "cost/frame"
-ROLES = ("bound", "baseline", "network", "solver", "external")  # of the project's own methods
+ROLES = ("baseline", "network", "solver", "external")  # of the project's own methods
 COLUMNS = (
     Column("entry", "Entry", text=True),
     Column("relative_excess/total", "Relative excess", "%"),

@@ -35,7 +35,7 @@ STATUSES = ("ok", "diverged", "stalled", "timeout", "out-of-memory", "failed", "
 
 # In this order methods stand in a report.
 ROLES = (
-    "reference", "bound", "baseline", "network", "ablation", "solver", "external", "reference-variant",
+    "reference", "baseline", "network", "ablation", "solver", "external", "reference-variant",
     "warm-started", "",
 )  # fmt: skip
 

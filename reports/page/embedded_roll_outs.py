@@ -92,7 +92,7 @@ def deflated(data: bytes) -> str:
 
 
 BUDGET = 25_000_000  # bytes of the whole page
-FIRST = ("reference", "bound", "baseline", "network", "external")  # roles of the methods of page one
+FIRST = ("reference", "baseline", "network", "external")  # roles of the methods of page one
 RULE = (
     "clips of garments first, then whole motions, then scenes without a body; in each of these the "
     "simulation, baselines, networks and the user's own before all others; the first seed of each method"

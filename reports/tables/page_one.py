@@ -53,7 +53,7 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
         rows_of_garment
     )
     chosen = leads(run, rows_of_garment)
-    others = [m for m in run.ordered(plain) if run.methods[m].role in ("network", "bound", EXTERNAL)]
+    others = [m for m in run.ordered(plain) if run.methods[m].role in ("network", EXTERNAL)]
     others += [m for m in run.ordered(plain) if run.methods[m].role == "baseline"]
     # Of a family of networks the last one: that of the highest level.
     last = {run.methods[m].family: m for m in others}

@@ -95,20 +95,6 @@ class GarmentNetwork(nn.Module):
         """Return the layers whose sum the offsets are."""
         return (self.offsets,)
 
-    def offset_space(self) -> tuple[Tensor, Tensor]:
-        """Return the offsets that the last layers can express: a basis (3 V, K) and a centre (3 V,) [m].
-
-        Raises:
-            ValueError: a network without a last layer.
-        """
-        layers = self.last_layers()
-        if not layers:
-            raise ValueError(f"{type(self).__name__} has no last layer, whose span could be minimised in")
-        biases: list[Tensor] = [layer.bias for layer in layers if layer.bias is not None]
-        centre = torch.stack(biases).sum(0) if biases else layers[0].weight.new_zeros(3 * self.vertices)
-        basis = torch.cat([layer.weight for layer in layers], dim=1)
-        return self.output_scale * basis.detach(), self.output_scale * centre.detach()
-
     def lay_out(self, plan: FramePlan, x: slice) -> None:
         """Add the operations of `forward` for one frame to the plan, of normalised features at x."""
         raise NotImplementedError

@@ -72,16 +72,6 @@ def compact_weights(distances: np.ndarray, reach: float) -> np.ndarray:
     return weights / weights.sum(axis=1, keepdims=True)
 
 
-def span(functions: np.ndarray) -> np.ndarray:
-    """Return a basis (3 V, 12 B) of the offsets that shape functions (V, B, 4) express.
-
-    Its columns belong to numbers in the order (3, B, 4): each function along x, then along y, then along
-    z.
-    """
-    flat = functions.reshape(len(functions), -1)
-    return np.einsum("vk,ij->vijk", flat, np.eye(3, dtype=flat.dtype)).reshape(3 * len(flat), -1)
-
-
 WIDTHS = (256, 256)
 
 
@@ -112,11 +102,6 @@ class HandleNetwork(GarmentNetwork):
     def last_layers(self) -> tuple[nn.Linear, ...]:
         """Return the layer whose zeros are no offsets."""
         return (self.numbers,)
-
-    def offset_space(self) -> tuple[Tensor, Tensor]:
-        """Return the offsets that handles can express: basis (3 V, 12 handles), and zero as centre (3 V,)."""
-        basis = span(self.functions.detach().numpy())
-        return torch.from_numpy(basis), self.functions.new_zeros(3 * self.vertices)
 
 
 class StaticHandles(HandleNetwork):
