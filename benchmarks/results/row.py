@@ -33,9 +33,9 @@ def read_json(path: Path) -> dict[str, Any]:
 USABLE = ("ok", "stalled")  # statuses of cells that came to their last frame: their numbers count
 STATUSES = ("ok", "diverged", "stalled", "timeout", "out-of-memory", "failed", "skipped")
 
-# In this order methods stand in a report.
+# In this order methods stand in a report. A bound is of runs before such methods went.
 ROLES = (
-    "reference", "baseline", "network", "ablation", "solver", "external", "reference-variant",
+    "reference", "bound", "baseline", "network", "ablation", "solver", "external", "reference-variant",
     "warm-started", "",
 )  # fmt: skip
 
