@@ -13,11 +13,11 @@ table NAME of RUN; COLUMN, ...; METHOD, ...  all where none is named
 claims primary of RUN, ...                   or exploratory: by the first run that has both methods,
                                              which the verdict names unless it is the first of these
 counts of RUN, ...                           how many claims came out how
-runs of RUN, ...                             day, commit and processor
+runs of RUN, ...                             day and commit
 evaluations of published runs                how often they evaluated test motions
 
-From the code come `attributes of MODULE.CLASS; NAME, ...`, `docstring of MODULE` (its table),
-`recipes of NAME, ...` and the parts that `PARTS` names.
+From the code come `docstring of MODULE` (its table), `recipes of NAME, ...` and the parts that `PARTS`
+names.
 """
 
 from __future__ import annotations
@@ -26,12 +26,11 @@ import math
 import re
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import fields, replace
 from functools import cache
 from importlib import import_module
 from pathlib import Path
 
-from benchmarks.declarations import attributes_of
 from benchmarks.metrics import declared
 from benchmarks.plan.study import PACKAGED, read_study
 from benchmarks.presets import PRESETS
@@ -50,8 +49,8 @@ from reports.tables.paper_tables import paper_tables
 from reports.tables.pivots import metric_tables
 from reports.tables.table import DASH, Table, number
 from reports.text.text_table import markdown_table, remarks_on, text_rows
-from snug.motion.library import source_rows
 from snug.named_recipes import RECIPES
+from snug.recipe import Recipe
 
 TIMED = ("quick",)  # runs with nothing beside them, which judge claims on times
 TIMES = ("s", "ms")  # units
@@ -79,7 +78,6 @@ def published_part(request: str) -> str:
     forms: dict[str, Callable[[], str | Rows]] = {
         "docstring": lambda: docstring_rows(source),
         "recipes": lambda: recipe_rows(source),
-        "attributes": lambda: chosen_rows(attribute_rows(names), wanted),
         "front": lambda: front_sentences(read_published(folders[0])),
         "table": lambda: _table(folders[0], name, wanted, methods),
         "claims": lambda: claim_rows(name, folders),
@@ -201,14 +199,14 @@ def likeness(correlation: float) -> str:
 
 
 def run_rows(folders: Sequence[Path]) -> Rows:
-    """Return a heading, and day, commit and processor of each run, of each part of a merged one."""
+    """Return a heading, and day and commit of each run, of each part of a merged one."""
     parts = [
-        (folder.name, str(part.get("finished", ""))[:10], part["commit"], part["hardware"]["processor"])
+        (folder.name, str(part.get("finished", ""))[:10], part["commit"])
         for folder in folders
         for config in [RunFolder(folder).read_config()]
         for part in config.get("merged", [config])
     ]
-    return [("Run", "Day", "Commit", "Processor"), *dict.fromkeys(parts)]
+    return [("Run", "Day", "Commit"), *dict.fromkeys(parts)]
 
 
 def evaluation_rows() -> Rows:
@@ -272,21 +270,6 @@ def chosen_rows(rows: Rows, names: Sequence[str]) -> Rows:
     return [rows[0], *(row_of_name[name] for name in names)] if names else rows
 
 
-def attribute_rows(path: str) -> Rows:
-    """Return a heading and a row of each attribute that the docstring of a class describes.
-
-    Args:
-        path: module and class, as "reference_sim.material.Material".
-
-    >>> attribute_rows("benchmarks.method.Reporting")[2]
-    ('`level`', 'place on that curve, as a number of iterations or a tolerance')
-    """
-    module, _, name = path.rpartition(".")
-    entries = attributes_of(getattr(import_module(module), name))
-    rows = [(f"`{names.replace(', ', '`, `')}`", content) for names, content in entries.items()]
-    return [("Field", "Content"), *rows]
-
-
 def docstring_rows(module: str) -> Rows:
     """Return the rows of the table in the docstring of a module.
 
@@ -310,10 +293,12 @@ def recipe_rows(names: str) -> Rows:
     """
     chosen = names.split(", ")
     rows = []
-    for option, _ in attribute_rows("snug.recipe.Recipe")[2:]:
-        values = [getattr(RECIPES[name], option.strip("`")) for name in chosen]
+    for option in fields(Recipe)[1:]:
+        values = [getattr(RECIPES[name], option.name) for name in chosen]
         if len(set(values)) > 1:
-            rows.append((option, *(f"{v:g}" if isinstance(v, float) else str(v) for v in values)))
+            rows.append(
+                (f"`{option.name}`", *(f"{v:g}" if isinstance(v, float) else str(v) for v in values))
+            )
     return [("Option", *(f"Recipe `{name}`" for name in chosen)), *rows]
 
 
@@ -346,7 +331,6 @@ PARTS = {
     "sizes": size_rows,
     "studies of benchmarks": study_rows,
     "evaluations of published runs": evaluation_rows,
-    "sources of the library": lambda: list(source_rows()),
 }
 
 

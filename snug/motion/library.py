@@ -7,8 +7,6 @@ docs/protocol.md. Nothing heavy is loaded before a motion is made, so that names
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
-from itertools import groupby
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,7 +16,6 @@ from snug.motion.motion import (
     Motion,
     MotionError,
     heading,
-    nearest_pose,
     spread_arms,
     turn_about_vertical,
 )
@@ -144,21 +141,3 @@ def _segment(name: str, clip: Motion) -> Motion:
     turned.translations[:, 1] += part.translations[0, 1]  # the floor stays where it is
     source = f"{clip.source}; frames {start} to {stop - 1}"
     return Motion(name, turned.poses, turned.translations, clip.fps, clip.kind, source)
-
-
-def source_rows() -> Iterator[tuple[str, ...]]:
-    """Yield a heading and a row of each independent source of test motions: a recording or one made by code.
-
-    The distances [deg] to training poses are over the frames of all test motions of the source.
-    """
-    yield "Test motions", "Content", "Frames", "Mean distance [deg]", "Largest distance [deg]"
-    training = np.concatenate([make_motion(name).poses for name in TRAIN])
-    by_recording = sorted(TEST, key=lambda name: (clip_of(name) not in CLIPS, name))
-    for clip, names in groupby(by_recording, key=clip_of):
-        first, *others = names
-        motions = [make_motion(name) for name in (first, *others)]
-        distances = [np.rad2deg(nearest_pose(motion.poses, training)) for motion in motions]
-        degrees = np.concatenate(distances)
-        listed = f"`{first}` to `{others[-1]}`" if others else f"`{first}`"
-        content = motions[0].kind if clip in CLIPS else f"{motions[0].kind}, by code"
-        yield listed, content, str(len(degrees)), f"{degrees.mean():.1f}", f"{degrees.max():.1f}"
