@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from benchmarks.scene import BuiltScene, Dressed
     from reference_sim.obstacle import Obstacle
 
-HANDLE = 3  # type of a vertex that is fixed to the body: NodeType in utils/common.py of HOOD
 THICKNESS = 4.7e-4  # [m], by which HOOD and ContourCraft multiply Lame's constants [Pa]
 MESHES = """\
 Scene {scene} for HOOD (commit a65f75b) and ContourCraft (3095acd): {frames} frames at {fps:g} a second,
@@ -39,7 +38,7 @@ to look at: a garment.pkl that HOOD makes of it has the vertices in another orde
        lame_lambda_override {lame_lambda:.6g}, bending_coeff_override {bending:.6g}
 3. Run Inference_from_any_pose.ipynb (HOOD) or Inference_from_mesh_sequence.ipynb (ContourCraft), a mesh
    sequence, with these two pickles and without n_steps. It writes temp/output_m.pkl.
-4. python -m benchmarks.score {method}=output_m.pkl --scene {scene}
+4. python -m benchmarks.score {method}=output_m.pkl --scene {scene}  (--set, ... of the export)
 """
 NCS = """\
 Scene {scene} for Neural Cloth Simulation (commit 8465ec5): {frames} frames at {fps:g} a second, metres, y up,
@@ -54,7 +53,7 @@ motion alone: for a fair comparison list training motions there, of other export
      json.dump(whole, open("configs/{name}.json", "w"))
 2. python train.py --config configs/{name}.json --gpu_id 0
 3. python predict.py --config configs/{name}.json --gpu_id 0     writes ../results/{name}/garment.pc2
-4. python -m benchmarks.score ncs=garment.pc2 --scene {scene}
+4. python -m benchmarks.score authors-ncs=garment.pc2 --scene {scene}  (--set, ... of the export)
 """
 
 
@@ -89,7 +88,7 @@ def _write_meshes(part: Path, scene: BuiltScene, obstacle: Obstacle) -> None:
     """Write what both read; what they return: runners/from_any_pose.py:96 and runners/ccraft.py:201."""
     cloth, start = scene.cloth, scene.start.astype(np.float32)
     types = np.zeros((cloth.vertex_count, 1), dtype=np.int64)
-    types[cloth.pins] = HANDLE
+    types[cloth.pins] = 3  # fixed to the body: NodeType.HANDLE in utils/common.py
     # Lines 651 and 660 of HOOD, 574 and 583 to 588 of ContourCraft: (N,B,3) and (G,3).
     verts = obstacle.positions.astype(np.float32)
     _write_pickle(part / "mesh_sequence.pkl", verts=verts, faces=obstacle.faces)

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from benchmarks.external.other_methods import write_for
 from benchmarks.external.roll_out_files import RollOutOption
-from benchmarks.methods import find_method
+from benchmarks.methods import METHODS, find_method
 from benchmarks.methods.outside import entry_of
 from reference_sim.files.array_file import read_pickled_arrays
 from tests.benchmarks.external.test_exported_scene import arrays, exported, home, rows_beside  # noqa: F401
@@ -135,6 +135,8 @@ def test_neural_cloth_simulation_poses_our_body_and_its_answer_is_scored(home, s
     header = struct.pack("<12siiffi", b"POINTCACHE2\0", 1, answer.shape[1], 0, 1, len(answer))
     (tmp_path / "garment.pc2").write_bytes(header + answer.astype(np.float32).tobytes())
     check_rows(tmp_path / "garment.pc2", home, skinned)
+    named = (folder / "README.txt").read_text().partition("benchmarks.score ")[2].partition("=")[0]
+    assert named not in {method.name for method in METHODS}  # a name that a run takes for another method
 
 
 def test_a_scene_without_a_body_is_refused(tmp_path):
