@@ -1,7 +1,7 @@
 """python -m reports.build RUN_DIR: tables, figures, page and PDF of a finished run.
 
 Reads run.json, results.csv, frame_energies.csv and trajectories in RUN_DIR, and nothing else; writes
-tables/*.csv, figures/*.svg and *.png, report.html and report.pdf there.
+tables/*.csv, for_your_paper.csv and .tex, figures/*.svg and *.png, report.html and report.pdf there.
 """
 
 from __future__ import annotations
@@ -48,12 +48,14 @@ def build_report(run_dir: str | Path) -> Built:
     from reports.page.write_page import write_page
     from reports.pdf import write_pdf
     from reports.tables import make_tables, write_tables
+    from reports.text.for_your_paper import write_paper_table
     from reports.text.text_table import answer
 
     folder = RunFolder(run_dir)
     run = read_run(folder)
     tables = make_tables(run)
     write_tables(folder.tables, tables.values())
+    write_paper_table(folder, run)
     if folder.trajectories.is_dir():  # else pictures of roll-outs that are gone stay
         for path in [path for figure in FIGURES for path in figure.files_in(folder.figures)]:
             path.unlink()

@@ -19,14 +19,14 @@ from benchmarks.metrics.energy import ENERGY, PRINTED_BENDING
 from benchmarks.metrics.energy_gap import GAP
 from benchmarks.metrics.intersections import INTERSECTIONS
 from benchmarks.metrics.own_energies import OWN_ENERGIES
-from benchmarks.metrics.penetration_and_distances import EXACT, GEOMETRY
+from benchmarks.metrics.penetration_and_distances import DEFORMATION, EXACT, GEOMETRY
 from benchmarks.metrics.roll_out import EXTRAPOLATION, LONG_ROLL_OUT
 from benchmarks.metrics.scene_facts import BODY, BODY_SHAPE, MESH
 from benchmarks.metrics.surface_distance import SURFACE
 
 MEASUREMENTS = (
-    ENERGY, OWN_ENERGIES, PRINTED_BENDING, CURVATURE, INTERSECTIONS, GEOMETRY, SURFACE, BODY, GAP, RELAXED,
-    EXACT, DYNAMICS, COST, EXTRAPOLATION, LONG_ROLL_OUT, MESH, BODY_SHAPE,
+    ENERGY, OWN_ENERGIES, PRINTED_BENDING, CURVATURE, DEFORMATION, INTERSECTIONS, GEOMETRY, SURFACE, BODY,
+    GAP, RELAXED, EXACT, DYNAMICS, COST, EXTRAPOLATION, LONG_ROLL_OUT, MESH, BODY_SHAPE,
 )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""Metrics distance/*, penetration/*, exact/distance: distances between cloths and into the body."""
+"""Metrics distance/*, penetration/*, deformation/*: from other cloths, into the body, from rest."""
 
 from __future__ import annotations
 
@@ -177,6 +177,21 @@ def measure_exact(roll_out: RollOut) -> dict[str, float]:
     return {"exact/distance": float(apart.max())}
 
 
+def measure_deformation(roll_out: RollOut) -> dict[str, float]:
+    """Return how far edges and faces are from their size at rest [%], as GAPS (Chen et al. 2024).
+
+    Source: class StVKLoss of its losses.py. What is pushed together counts as what is stretched.
+    """
+    cloth, x = roll_out.scene.cloth, roll_out.positions[roll_out.judged]
+    lengths = np.linalg.norm(x[:, cloth.edges[:, 1]] - x[:, cloth.edges[:, 0]], axis=2)
+    sides = x[:, cloth.faces[:, 1:]] - x[:, cloth.faces[:, :1]]
+    areas = 0.5 * np.linalg.norm(np.cross(sides[:, :, 0], sides[:, :, 1]), axis=2)
+    return {
+        "deformation/edges": 100.0 * float(np.abs(lengths / cloth.edge_lengths - 1.0).mean()),
+        "deformation/areas": 100.0 * float(np.abs(areas / cloth.areas - 1.0).mean()),
+    }
+
+
 GEOMETRY = Measurements(
     "geometry",
     metrics_of(
@@ -197,6 +212,15 @@ GEOMETRY = Measurements(
         table="penetration", lower_is_better=True,
     ),
     measure=measure, compare=compare, other_meshes=True,
+)  # fmt: skip
+DEFORMATION = Measurements(
+    "deformation",
+    metrics_of(
+        ("deformation/edges", "%", "Edges", "|length / rest length - 1|, mean over edges and frames"),
+        ("deformation/areas", "%", "Areas", "|area / rest area - 1|, mean over faces and frames"),
+        table="deformation", lower_is_better=True,
+    ),
+    measure=measure_deformation,
 )  # fmt: skip
 EXACT = Measurements(
     "exact",

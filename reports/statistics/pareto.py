@@ -22,7 +22,6 @@ PLANES = {"gap/energy": "gap/refrozen"}
 SMALLER_STEPS = "simulation-dt"  # a family of another problem: its steps have another potential
 # Of the step's own potential, which another step size changes.
 OWN_STEP = ("gap/energy", "step/curvature", "step/distance")
-MOST_SLACK = 0.2  # share of a run time within which another one may count as no slower
 
 
 @dataclass(frozen=True)
@@ -129,17 +128,6 @@ def indistinct(run: Run, rows: pd.DataFrame, metric: str) -> float:
     else:
         of_scene = error_of_twin(rows, metric)
     return float(of_scene.mean()) if len(of_scene) else 0.0
-
-
-def beaten_by(points: Sequence[Point], point: Point) -> Point | None:
-    """Return the most accurate of the points that are no slower and no less accurate, or None.
-
-    No slower means: by no more than the point's own repeats. A rival whose run times scatter widely is no
-    faster for that; nor is one that takes much longer.
-    """
-    latest = point.time + min(point.time_spread, MOST_SLACK * point.time)
-    rivals = [p for p in points if p is not point and p.error <= point.error and p.time <= latest]
-    return min(rivals, key=lambda p: p.error) if rivals else None
 
 
 def compared_cells(run: Run) -> tuple[pd.DataFrame, list[str]]:

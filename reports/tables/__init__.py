@@ -19,7 +19,7 @@ from reports.tables.findings import (
 )
 from reports.tables.page_one import error_rivals, overview, reference_uncertainty
 from reports.tables.paper_tables import paper_tables
-from reports.tables.pivots import ablation_effects, ablations, metric_tables, shapes
+from reports.tables.pivots import ablation_effects, metric_tables, shapes
 from reports.tables.table import Table
 
 TABLES: tuple[Callable[[Run], list[Table]], ...] = (
@@ -29,7 +29,6 @@ TABLES: tuple[Callable[[Run], list[Table]], ...] = (
     relative_excess,
     errors_in_spreads,
     findings,
-    ablations,
     ablation_effects,
     error_rivals,
     reference_uncertainty,

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-
 import pandas as pd
 
 from benchmarks.metric import Metric
 from benchmarks.results.protocol import SECOND_STARTS
 from reports.finished_run import Run
-from reports.statistics.means_and_spreads import mean_of, means
+from reports.statistics.means_and_spreads import means
 from reports.statistics.relative_excess import (
     SKINNING,
     TOTAL,
@@ -99,36 +97,19 @@ def pivot(
     return metrics, sorted(lines, key=order)
 
 
-SHOWN = (
-    "energy/strain", "energy/bending", "energy/gravity", "energy/inertia", "energy/collision", "energy/total",
-    "curvature/histogram", "curvature/mean_difference", "penetration/vertices", "dynamics/correlation",
-    "dynamics/amplitude", "roll_out/drift",
-)  # fmt: skip
 # A term that is left out of the loss is of course larger; the total is the base's own loss, curvature is
 # nobody's.
 COMPARED = ("energy/total", "curvature/histogram", "penetration/vertices", "roll_out/drift")
-HEAD = (GARMENT, METHOD)
-
-
-def ablations(run: Run) -> list[Table]:
-    """Tabulate the numbers of each base and of its ablations that ran, by garment."""
-    metrics = [run.metrics[name] for name in SHOWN if name in run.metrics]
-    lines: list[tuple[Cell, ...]] = [
-        (garment, method, *(mean_of(rows, method, metric.name) for metric in metrics))
-        for garment, base, below, rows in _families(run)
-        for method in (base, *below)
-    ]
-    columns = [metric_column(metric) for metric in metrics]
-    caption = "Ablations: the base first, then its variants."
-    return table("ablations", (*HEAD, *columns), lines, caption, grouped_by=("garment",))
 
 
 def ablation_effects(run: Run) -> list[Table]:
     """Tabulate the effect of each ablation against its base, with intervals."""
     metrics = [run.metrics[name] for name in COMPARED if name in run.metrics]
     lines: list[tuple[Cell, ...]] = []
-    for garment, base, below, rows in _families(run):
-        for method in below:
+    for garment in run.garments(run.garment_rows):
+        rows = run.garment_rows[run.garment_rows["garment"] == garment]
+        for method in run.ordered(run.standing_apart(rows) & set(rows[rows["usable"]]["method"])):
+            base = run.methods[method].base
             effects = [compare_methods(run, rows, metric, method, base).effect for metric in metrics]
             lines.append((garment, method, *effects))
     caption = (
@@ -138,19 +119,8 @@ def ablation_effects(run: Run) -> list[Table]:
     )
     note = "Below: 95 % intervals over motions and seeds; of points with the mean nearer to 0 held."
     shown = [relative_metric(metric.name) if metric.arbitrary_zero else metric for metric in metrics]
-    columns = (*HEAD, *map(metric_column, shown))
+    columns = (GARMENT, METHOD, *map(metric_column, shown))
     return table("ablation_effects", columns, lines, caption, grouped_by=("garment",), note=note)
-
-
-def _families(run: Run) -> Iterator[tuple[str, str, list[str], pd.DataFrame]]:
-    """Yield garment, base, the ablations that ran with it, and the rows of the garment."""
-    for garment in run.garments(run.garment_rows):
-        rows = run.garment_rows[run.garment_rows["garment"] == garment]
-        usable = rows[rows["usable"]]["method"]
-        ablations_here = run.standing_apart(rows)
-        below = [method for method in run.ordered(usable) if method in ablations_here]
-        for base in dict.fromkeys(run.methods[method].base for method in below):
-            yield garment, base, [m for m in below if run.methods[m].base == base], rows
 
 
 METRICS = (TOTAL, "energy/strain", "energy/collision", "penetration/vertices")

@@ -14,6 +14,7 @@ claims primary of RUN, ...                   or exploratory: by the first run th
                                              which the verdict names unless it is the first of these
 counts of RUN, ...                           how many claims came out how
 runs of RUN, ...                             day and commit
+times of RUN, ...; METHOD, ...               as published, and by the first run that has the method
 evaluations of published runs                how often they evaluated test motions
 
 From the code come `docstring of MODULE` (its table), `recipes of NAME, ...` and the parts that `PARTS`
@@ -48,6 +49,7 @@ from reports.tables.page_one import overview
 from reports.tables.paper_tables import paper_tables
 from reports.tables.pivots import metric_tables
 from reports.tables.table import DASH, Table, number
+from reports.text.published_times import time_rows
 from reports.text.text_table import markdown_table, remarks_on, text_rows
 from snug.named_recipes import RECIPES
 from snug.recipe import Recipe
@@ -83,6 +85,7 @@ def published_part(request: str) -> str:
         "claims": lambda: claim_rows(name, folders),
         "counts": lambda: claim_counts(folders),
         "runs": lambda: run_rows(folders),
+        "times": lambda: time_rows([(read_published(f), _made(f, "cost")) for f in folders], wanted),
     }
     if kind not in forms:
         raise ValueError(f"no part is generated from '{request}'; known: {', '.join((*forms, *PARTS))}")

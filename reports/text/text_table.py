@@ -49,21 +49,6 @@ def remarks_on(rows: Sequence[Sequence[str]]) -> str:
     return " ".join(REMARKS[mark] for mark in sorted(marks))
 
 
-def aligned_text(rows: Sequence[Sequence[str]]) -> str:
-    """Return the rows as lines whose columns stand below each other, the first from the left.
-
-    >>> print(aligned_text([["method", "total [J]"], ["snug", "0.34"]]))
-    method  total [J]
-    snug         0.34
-    """
-    widths = [max(map(len, column)) for column in zip(*rows)]
-    lines = []
-    for first, *rest in rows:
-        cells = [cell.rjust(width) for cell, width in zip(rest, widths[1:])]
-        lines.append("  ".join([first.ljust(widths[0]), *cells]).rstrip())
-    return "\n".join(lines)
-
-
 def markdown_table(rows: Sequence[Sequence[str]]) -> str:
     """Return the rows as a table of Markdown, the first row its head.
 
@@ -91,7 +76,7 @@ def answer(run: Run, tables: Mapping[str, Table]) -> str:
         table = tables["overview"]
         names = [column.name for column in table.columns]
         rows = text_rows(run, table, [name for name in COLUMNS if name in names][:MOST_COLUMNS])
-        lines.append(aligned_text(rows))
+        lines.append(markdown_table(rows))
         notes = [remarks_on(rows)]
     chief = [text for topic, text in headline(run) if topic == "How near"]
     lines.append(" ".join(filter(None, [*chief, *notes])))

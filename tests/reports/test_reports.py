@@ -73,6 +73,7 @@ def test_every_file_of_the_report_is_there(made):
     names = {path.name for path in made.tables.iterdir()}
     wanted = ("energies", "curvature", "cost", "validation", "extremes", "unfinished")
     assert {f"{name}.csv" for name in wanted} <= names
+    assert {"for_your_paper.csv", "for_your_paper.tex"} <= {path.name for path in made.path.iterdir()}
     pictures = {path.name for path in made.figures.iterdir()}
     for stem in ("energy_series_tshirt-walk", "error_against_time"):
         assert {f"{stem}.svg", f"{stem}.png"} <= pictures
@@ -131,7 +132,7 @@ def test_a_broken_file_is_named_and_the_rest_goes_on(tmp_path, capsys):
     streams = capsys.readouterr()
     assert "tshirt-walk/snug.vtkhdf" in streams.err
     assert streams.out.splitlines()[-1] == str(run.report_path) and run.report_path.is_file()
-    assert streams.out.startswith("Method ") and "the relative excess is: SNUG" in streams.out
+    assert streams.out.startswith("| Method ") and "the relative excess is: SNUG" in streams.out
 
 
 def test_curves_beside_a_trajectory_are_its_own(tmp_path):

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
+import pandas as pd
 import pytest
 
 from benchmarks.declarations import attributes_of
 from benchmarks.external.roll_out_files import KEYS
 from benchmarks.results.row import COLUMNS, Row
+from benchmarks.results.run_folder import RunFolder
 from reports.docs import documents, main
 from reports.statistics.effects import EXCESS, Effect
 from reports.statistics.means_and_spreads import Mean
 from reports.tables.table import METHOD, Column, Table
+from reports.text.for_your_paper import latex, write_paper_table
 from reports.text.published_parts import (
     BEGIN,
     END,
@@ -98,3 +102,69 @@ def test_a_part_without_an_end_and_a_part_of_no_form_are_refused(tmp_path):
     ):  # fmt: skip
         with pytest.raises(KeyError):
             published_part(request)
+
+
+HOSTILE = r"50% off_{a} & #1 [b] ~^ \x"
+
+
+def rows_for_a_paper(**more) -> list[Row]:
+    """Rows of five motions and two seeds of SNUG between simulation and skinning, each with its numbers."""
+    energy = {"simulation": 1.0, "skinning": 11.0, "snug": 2.0}
+    rows = [
+        row(f"tshirt/m{k}", name, "energy/total", value * (k + 1) ** (0.1 * seed), seed=seed, **more)
+        for k in range(5) for name, value in energy.items() for seed in range(1 + (name == "snug"))
+    ]  # fmt: skip
+    more |= {"unit": "%", "method": "snug"}
+    rows += [row(f"tshirt/m{k}", metric="penetration/surface", value=0.5 + k, **more) for k in range(5)]
+    return [*rows, row("tshirt/m0", metric="cost/frame", value=0.25, **more | {"unit": "ms"})]
+
+
+def test_the_table_for_a_paper_has_intervals_counts_protocol_and_columns_of_the_run_alone(tmp_path):
+    run = run_of(rows_for_a_paper(protocol="2.0"), commit="abc123")
+    write_paper_table(RunFolder(tmp_path), replace(run, protocol="2.0"))
+    lines = pd.read_csv(tmp_path / "for_your_paper.csv", na_values="-").set_index("method")
+    assert list(lines.index) == ["simulation", "skinning", "snug"]
+    snug = lines.loc["snug"]
+    assert (snug["motions"], snug["seeds"]) == (5, 2) and snug["relative_excess [%]"] == pytest.approx(
+        10, 0.2
+    )
+    assert snug["relative_excess_low"] < snug["relative_excess [%]"] < snug["relative_excess_high"]
+    assert snug["penetration/surface [%]"] == 2.5 and snug["penetration/surface_low"] == pytest.approx(
+        0.537, 1e-2
+    )
+    assert snug["cost/frame [ms]"] == 0.25 and not {"distance/rms [mm]", "own_excess [%]"} & set(lines)
+    assert "Protocol 2.0; cite: Neural garments" in snug["caption"] and "abc123" in snug["caption"]
+
+
+def test_the_latex_of_the_table_for_a_paper_is_sound_whatever_names_hold(tmp_path):
+    run = run_of(rows_for_a_paper())
+    methods = {**run.methods, "snug": replace(run.methods["snug"], label=HOSTILE)}
+    write_paper_table(RunFolder(tmp_path), replace(run, methods=methods))
+    text = (tmp_path / "for_your_paper.tex").read_text(encoding="utf-8")
+    assert text.isascii() and (text.count("$") - text.count(r"\$")) % 2 == 0
+    assert re.findall(r"\\begin\{(.*?)\}", text) == re.findall(r"\\end\{(.*?)\}", text)[::-1]
+    plain = re.sub(r"\\[\\&%$#_{}]|\\[a-z]+", "", text)
+    assert plain.count("{") == plain.count("}") and not set(plain) & set("#_^~\\")
+    assert plain.count("%") == 1 and plain.startswith("% Needs")  # the one comment
+    body = text[text.index(r"\toprule") :].split("\\\\[4pt]\n")[:-1]
+    assert len(body) == 4 and {re.sub(r"\\&", "", line).count("&") for line in body} == {5}
+    assert latex(HOSTILE) == (
+        r"50\% off\_\{a\} \& \#1 {[}b{]} \textasciitilde{}\textasciicircum{} \textbackslash{}x"
+    )
+
+
+def test_times_stand_as_published_and_as_measured():
+    head, *rows = (
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in published_part("times of quick, ablations; tailornet, snug, handles-80").splitlines()
+    )
+    assert head[0] == "Method" and all(len(row) == len(head) for row in rows)
+    names = [row[0] for row in rows[1:]]
+    assert names[:5] == ["TailorNet"] * 3 + ["SNUG", "80 handles"] and "HOOD" in names[5:]
+    by_name = {row[0]: row for row in rows}
+    assert by_name["SNUG"][1] == "2.2" and "table 3" in by_name["SNUG"][3]
+    assert by_name["SNUG"][4:6] == ["0.922", "0.409"] and by_name["80 handles"][1:4] == ["–"] * 3
+    assert by_name["HOOD"][4:] == ["–"] * 3 and float(by_name["TailorNet"][6]) < float(
+        by_name["TailorNet"][4]
+    )
+    assert all(row[3] != "–" for row in rows[1:] if row[1] != "–")  # no time without its source

@@ -144,7 +144,7 @@ def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(run, rows,
     costs = {"cost/frame", "cost/whole", "cost/peak"}
     expected = {
         "curvature/mean", "energy/total", "gap/relative", "gap/local", "gradient/norm",
-        "intersections/triangles",
+        "intersections/triangles", "deformation/edges", "deformation/areas",
     }  # fmt: skip
     against = {"distance/rms", "distance/p95", "curvature/error", "curvature/histogram"}
     for name, scene in scenes.items():
@@ -170,6 +170,7 @@ def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(run, rows,
                 or (on_body and method in ("skinning", "simulation")),
                 "dynamics/amplitude": answered,
                 "dynamics/common_amplitude": on_body,
+                "intersections/volume": on_body,
             }.items():
                 assert (metric in values) == has_it, (name, method, metric)
             if method == "simulation" and on_body:

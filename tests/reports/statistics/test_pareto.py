@@ -9,7 +9,6 @@ import pytest
 from benchmarks.results.row import Row
 from reports.statistics.pareto import (
     Point,
-    beaten_by,
     fastest,
     front,
     indistinct,
@@ -85,16 +84,6 @@ def test_a_run_time_spreads_as_its_repeats_do_else_as_its_seeds():
     run = run_of(rows)
     (again,) = solvers(run, points_of(run, run.cells("speed"), SCENES[:1], "gap/energy"))
     assert again.time_spread == 2.5  # [ms] from the fastest repeat to the slowest
-
-
-def test_as_fast_is_within_the_scatter_of_run_times():
-    point, twin = Point("snug", 0.350, 4.2, 0.008), Point("supervised", 0.357, 3.7, 0.006)
-    assert beaten_by([point, twin], point) is twin
-    assert beaten_by([point, twin], twin) is None  # the other is less accurate
-    slower = dataclasses.replace(twin, time=0.361)
-    assert beaten_by([point, slower], point) is None
-    once = Point("snug", 0.350, 4.2), Point("supervised", 0.357, 3.7)
-    assert beaten_by(once, once[0]) is None  # no repeats: no scatter
 
 
 def test_a_point_is_of_the_seeds_that_did_every_scene():

@@ -1,0 +1,136 @@
+"""A table for a paper, as CSV and as LaTeX: what reviewers of learned garments ask for.
+
+Numbers are means over independent sources of motion, of a source over its segments, and over seeds.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+
+import pandas as pd
+
+from benchmarks.metric import Metric
+from benchmarks.results.protocol import LEAST_MOTIONS
+from benchmarks.results.run_folder import RunFolder
+from reference_sim.files.atomic_files import replacing
+from reports.finished_run import Run
+from reports.statistics.effects import RANGE, Effect, recording_of
+from reports.statistics.means_and_spreads import pair
+from reports.statistics.pareto import run_time
+from reports.statistics.relative_excess import excess_of, own_excess_of, with_relative_excess
+from reports.statistics.verdicts import effect_of
+from reports.tables.table import DASH, METHOD, Cell, Column, Table, column_texts, metric_column
+
+NAME = "for_your_paper"
+METRICS = (
+    "penetration/surface", "intersections/triangles", "intersections/volume", "deformation/edges",
+    "deformation/areas", "distance/rms", "dynamics/common_correlation",
+)  # fmt: skip
+CITATION = "Neural garments versus a reference solver: a physics-validation benchmark"
+
+
+def write_paper_table(folder: RunFolder, run: Run) -> None:
+    """Write for_your_paper.csv, whose rows repeat the caption, and for_your_paper.tex."""
+    table = paper_table(run)
+    rows = tuple((*row, table.caption) for row in table.rows)
+    columns = (*table.columns, Column("caption", "Caption", text=True))
+    replace(table, columns=columns, rows=rows).write_csv(folder.path)
+    with replacing(folder.path / f"{NAME}.tex") as temporary:
+        temporary.write_text(latex_table(run, table), encoding="utf-8", newline="\n")
+
+
+def paper_table(run: Run) -> Table:
+    """Return the methods on the first garment, or in all scenes, with columns that the run has."""
+    rows = run.garment_rows[run.garment_rows["garment"] == run.first_garment]
+    rows = run.cells() if rows.empty else rows
+    apart = {"", *run.standing_apart(rows), *run.twins, *run.with_role("reference-variant")}
+    rows = rows[~rows["method"].isin(apart)]
+    usable, excesses = rows[rows["usable"]], with_relative_excess(run, rows)
+    metrics = [run.metrics[name] for name in (*METRICS, run_time(rows)) if name in set(usable["metric"])]
+    lines: list[tuple[Cell, ...]] = []
+    for method in run.ordered(usable["method"]):
+        of_method = usable[usable["method"] == method]
+        common = excess_of(run, excesses, method) if method != run.reference else None
+        effects = [own_excess_of(run, rows, method), common and common.effect]
+        effects += [_mean(rows, method, metric) for metric in metrics]
+        counts = of_method["scene"].map(recording_of).nunique(), of_method["seed"].nunique()
+        lines.append((method, *counts, *(effect and _cell(effect) for effect in effects)))
+    columns = [
+        METHOD, Column("motions", "Motions"), Column("seeds", "Seeds"),
+        Column("own_excess", "Own excess", "%"), Column("relative_excess", "Relative excess", "%"),
+        *map(metric_column, metrics),
+    ]  # fmt: skip
+    kept = [k for k, cells in enumerate(zip(*lines)) if any(cell is not None for cell in cells)]
+    caption = (
+        f"{run.first_garment or 'All scenes'}: means over independent sources of motion and over seeds, of "
+        "excess geometric; below: 95 % intervals, of times the range. Excess: energy above a reference "
+        "solver's as a share of skinning's, in each method's own energies and in common ones. "
+        f"Protocol {run.protocol or 'own'}; cite: {CITATION}, at {run.config.get('commit') or 'no commit'}."
+    )
+    chosen = tuple(tuple(line[k] for k in kept) for line in lines)
+    return Table(NAME, tuple(replace(columns[k], digits=2) for k in kept), chosen, caption)
+
+
+def _mean(rows: pd.DataFrame, method: str, metric: Metric) -> Effect | None:
+    """Return a mean as its difference from zero, which has an interval; None without one."""
+    mean, _ = pair(rows, method, method, metric.name)
+    if mean is None:
+        return None
+    zero = replace(mean, value=0.0, cells=dict.fromkeys(mean.cells, 0.0), seeded=False, pairing_group="")
+    least = -math.inf if min(mean.cells.values()) < 0.0 else 0.0
+    far = effect_of(metric, mean, replace(zero, moved={}, uncertainty=None))
+    return replace(far, possible=(least, math.inf))
+
+
+def _cell(effect: Effect) -> Effect | float:
+    """Return the number alone where its interval says nothing."""
+    low, high = effect.interval or (0.0, 0.0)
+    enough = effect.covers == RANGE or effect.motions >= LEAST_MOTIONS
+    return effect if enough and high - low > 1e-6 * abs(high) else effect.shown
+
+
+def latex_table(run: Run, table: Table) -> str:
+    """Return a table as a float of LaTeX, an interval below its number."""
+    columns = [column_texts(run, column, cells) for column, cells in zip(table.columns, zip(*table.rows))]
+    heads = [
+        _stacked(*column.title.replace(", ", " ").split(), f"[{column.unit}]" * bool(column.unit))
+        for column in table.columns
+    ]
+    body = [[_stacked(cell["text"].removeprefix("+"), cell["spread"].replace(" to ", DASH)) for cell in line]
+        for line in zip(*columns)]  # fmt: skip
+    lines = [f"\\raggedright {' & '.join(line)} \\\\[4pt]" for line in (heads, *body)]
+    sides = "".join("p{2.7cm}" if column.text else "r" for column in table.columns)
+    return "\n".join([
+        "% Needs \\usepackage{booktabs}.", "\\begin{table*}", "\\centering\\scriptsize",
+        f"\\setlength{{\\tabcolsep}}{{2pt}}\n\\caption{{{latex(table.caption)}}}",
+        f"\\begin{{tabular}}{{{sides}}}", "\\toprule", lines[0], "\\midrule", *lines[1:],
+        "\\bottomrule", "\\end{tabular}", "\\end{table*}", "",
+    ])  # fmt: skip
+
+
+def _stacked(*texts: str) -> str:
+    """Return the texts below each other in one cell."""
+    lines = r"\\".join(latex(text) for text in texts if text)
+    return f"\\shortstack{{{lines}}}" if r"\\" in lines else lines
+
+
+COMMANDS = {
+    "\\": r"\textbackslash{}", "^": r"\textasciicircum{}", "~": r"\textasciitilde{}", "<": "$<$", ">": "$>$",
+    "|": "$|$", "−": "$-$", "×": r"$\times$", "∞": r"$\infty$", DASH: "--", "[": "{[}", "]": "{]}",
+    **{mark: f"\\{mark}" for mark in "&%$#_{}"},
+}  # fmt: skip
+RAISED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
+
+
+def latex(text: str) -> str:
+    r"""Return the text as LaTeX prints it.
+
+    >>> latex("a_b 5 %"), latex("2.50×10⁻⁷"), latex("cm^3")
+    ('a\\_b 5 \\%', '2.50$\\times$10$^{-7}$', 'cm$^{3}$')
+    """
+    parts = re.split(r"(\^\d+|[⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)", text)  # every second one is a power
+    parts[::2] = ["".join(COMMANDS.get(mark, mark) for mark in part) for part in parts[::2]]
+    parts[1::2] = [f"$^{{{part.translate(RAISED).removeprefix('^')}}}$" for part in parts[1::2]]
+    return "".join(parts)

@@ -1,0 +1,46 @@
+"""Run times as others publish them, beside those of this project's runs, in ms a frame.
+
+reports/published/times has the published ones, of which page, section or file can be named, and the
+processor time a body where bodies are computed at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import pandas as pd
+
+from reports.finished_run import Run
+from reports.statistics.means_and_spreads import Mean
+from reports.statistics.outcomes import PUBLISHED
+from reports.tables.table import DASH, Table, number
+
+MANY = 64  # bodies at once
+HEADS = (
+    "Method", "Published [ms]", "Device, batch, clock", "Source", "End to end [ms]", "Method alone [ms]",
+    f"{MANY} at once [ms]",
+)  # fmt: skip
+
+
+def time_rows(costs: Sequence[tuple[Run, Table]], methods: Sequence[str]) -> list[tuple[str, ...]]:
+    """Return heads and rows: these methods, then those that are published alone.
+
+    Args:
+        costs: runs with their tables of costs; a method is measured in the first that has it.
+        methods: names; some have several published times, most none.
+    """
+    batches, published = (pd.read_csv(PUBLISHED / "times" / f"{x}.csv") for x in ("batches", "published"))
+    many = batches[batches["bodies"] == MANY].set_index("method")["processor_ms"]
+    measured: dict[str, tuple[str, ...]] = {}
+    for run, table in reversed(costs):
+        places = {column.name: place for place, column in enumerate(table.columns)}
+        for row in table.rows:
+            method, *means = (row[places[name]] for name in ("method", "cost/whole", "cost/frame"))
+            here = [number(mean.value if isinstance(mean, Mean) else None) for mean in means]
+            measured[str(method)] = run.label(str(method)), *here, number(many.get(method))
+    known = {name: rows.to_numpy().tolist() for name, rows in published.groupby("method", sort=False)}
+    rows = [HEADS]
+    for name in dict.fromkeys([*methods, *(name for name in known if name not in measured)]):
+        label, *here = measured.get(name, (name, *[DASH] * 3))
+        rows += [(label, *how, *here) for _, *how in known.get(name, [[name, *[DASH] * 3]])]
+    return rows
