@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -47,7 +48,7 @@ def parse_toml(text: str) -> dict[str, Any]:
     return table
 
 
-def check_values(table: dict[str, Any]) -> None:
+def check_values(table: Mapping[str, Any]) -> None:
     """Raise ValueError for a table deeper than DEEPEST, or with a whole number beyond 64 bits."""
     level: list[Any] = [table]
     for _ in range(DEEPEST + 1):
