@@ -17,7 +17,7 @@ STEP = 1e-3  # times a random direction of some hundredths of a metre
 WEIGHTS = np.array([1, -8, 8, -1]) / 12  # at -2, -1, 1 and 2 steps
 
 
-TERMS = ("strain", "spring", "bending", "gravity", "inertia", "collision", "area_barrier")
+TERMS = ("strain", "spring", "bending", "gravity", "inertia", "collision")
 DIFFERENTIATED = {"gradient": 0, "hessian": 1}  # the energy, or the gradient
 
 
@@ -51,8 +51,6 @@ def _in_disorder(term: str) -> tuple[energies.Energy, np.ndarray]:
     cloth = flat_cloth(*jittered_patch(5))
     random = np.random.default_rng(0)
     x = cloth.rest_positions @ random_rotation(8).T + random.normal(0, 0.05, cloth.rest_positions.shape)
-    if term == "area_barrier":
-        x = 0.4 * x  # a sixth of the area: the barrier holds
     make: dict[str, Callable[[], energies.Energy]] = {
         "strain": lambda: energies.StretchStVK(cloth),
         "spring": lambda: energies.StretchSpring(cloth),
@@ -60,7 +58,6 @@ def _in_disorder(term: str) -> tuple[energies.Energy, np.ndarray]:
         "gravity": lambda: energies.Gravity(cloth),
         "inertia": lambda: energies.Inertia(cloth, 1 / 30),
         "collision": lambda: _all_in_contact(cloth, x, random),
-        "area_barrier": lambda: energies.AreaBarrier(cloth),
     }
     return make[term](), x
 

@@ -149,7 +149,6 @@ FURTHER: dict[str, dict[str, Any]] = {
     "one_point": ONE_POINT,
     "collapsed_triangle": {"start": "collapsed triangle"},
     "hinge_stiff_through_pi": STIFF_HINGE,
-    "hinge_stiff_through_pi_barrier": {**STIFF_HINGE, "terms": "membrane+bending+area"},
     "rest_angles_random": {"rest_angles": "random", "bending": 100.0},
     "slivers": {"shape": "slivers"},
     "sliver_row": {"shape": "sliver row", "start": "flat"},
@@ -205,7 +204,7 @@ def sheet_step(
         speed: scale [m/s] of random velocities, or the name of a field in `VELOCITIES`.
         rest_angles: [rad] of every hinge, or "random" within half a turn.
         shape: name in `REST_SHAPES`: how the mesh at rest differs from an even one.
-        terms: which of "membrane", "bending" and "area" (the barrier against collapse), joined by "+".
+        terms: which of "membrane" and "bending", joined by "+".
         body: name in `BODIES`; "" for none.
     """
     random = np.random.default_rng(11)
@@ -222,8 +221,6 @@ def sheet_step(
             random.uniform(-np.pi, np.pi, len(cloth.hinges)) if rest_angles == "random" else rest_angles
         )
         declared.append(energies.BendHinge(cloth, rest_angles=angles))
-    if "area" in terms:
-        declared.append(energies.AreaBarrier(cloth, stiffness=100.0 * stiffness))
     declared.append(energies.Gravity(cloth, acceleration=gravity * sim.GRAVITY))
     if body:
         declared.append(energies.ContactPenalty(cloth, margin=MARGIN))

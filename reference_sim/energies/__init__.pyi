@@ -1,4 +1,3 @@
-from .area_barrier import AreaBarrier as AreaBarrier
 from .bend_hinge import BendHinge as BendHinge
 from .contact_barrier import ContactBarrier as ContactBarrier
 from .contact_friction import ContactFriction as ContactFriction
@@ -11,7 +10,6 @@ from .stretch_spring import StretchSpring as StretchSpring
 from .stretch_stvk import StretchStVK as StretchStVK
 
 __all__ = [
-    "AreaBarrier",
     "BendHinge",
     "ContactBarrier",
     "ContactFriction",

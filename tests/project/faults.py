@@ -56,8 +56,6 @@ FAULTS = (
     Fault("half a spring's force", "_gradient", "s = 2 * stiffness * stretch", "s = stiffness * stretch"),
     Fault("slack springs stiff across", "StretchSpring.active_hessian_blocks", "slack = (1 - self",
           "slack = (1 + self"),
-    Fault("half the barrier's first slope", "_gradient", "(2 * (q - q0) * log +", "(1 * (q - q0) * log +"),
-    Fault("half the barrier's middle curvature", "_hessian", "(2 * log + 4 *", "(2 * log + 2 *"),
     # hinges
     Fault("rest angle added", "_from_rest", "theta -= rest", "theta += rest"),
     Fault("half the hinge stiffness", "_block", "k, s = u[12", "k, s = 0.5 * u[12"),

@@ -38,8 +38,6 @@ WITNESSES = {
     "strain as seen from above": ("rigid_invariance",),
     "half a spring's force": ("gradient_of_spring",),
     "slack springs stiff across": ("hessian_of_spring",),
-    "half the barrier's first slope": ("gradient_of_area_barrier",),
-    "half the barrier's middle curvature": ("hessian_of_area_barrier",),
     "rest angle added": ("hinges_rest_shape_force",),
     "any step will do": ("newton_never_rises",),
     "convergence ignores the gradient": ("unique_step",),

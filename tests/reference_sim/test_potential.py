@@ -7,7 +7,6 @@ import pytest
 
 from reference_sim import Cloth, Potential
 from reference_sim.energies import (
-    AreaBarrier,
     BendHinge,
     ContactPenalty,
     Energy,
@@ -35,7 +34,7 @@ def all_terms(pins: tuple[int, ...] = ()) -> tuple[Cloth, list[Energy], np.ndarr
         Inertia(cloth, 0.01),
     ]
     crumpled = cloth.rest_positions + np.random.default_rng(1).normal(0, 0.002, x.shape)
-    return cloth, [*terms, contact, AreaBarrier(cloth, threshold=1.5)], crumpled
+    return cloth, [*terms, contact], crumpled
 
 
 def dense_sum(energies: list[Energy], x: np.ndarray) -> np.ndarray:

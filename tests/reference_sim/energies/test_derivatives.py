@@ -17,7 +17,6 @@ from numba import vectorize
 
 from reference_sim import Cloth, Material, energies
 from reference_sim.energies import (
-    AreaBarrier,
     BendHinge,
     ContactFriction,
     ContactPenalty,
@@ -132,7 +131,6 @@ CASES = [
     Case("collision-vertices", lambda c: contact(c, samples="vertices"), **IN_CONTACT),
     Case("collision-paper", lambda c: contact(c, **PAPER), **IN_CONTACT),
     Case("friction", friction, active=0.8, gradient=0.1, hessian=10.0),
-    Case("area-barrier", AreaBarrier, active=0.5, scale=0.5, gradient=1e-2, hessian=1.0),
 ]
 every_case = pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 
@@ -287,7 +285,6 @@ SHEET = Cloth(*grid(3, 3, width=0.1, depth=0.1))
         lambda cloth: ContactPenalty(cloth, margin=float("nan")),
         lambda cloth: ContactPenalty(cloth, per_sample_stiffness=float("inf")),
         lambda cloth: ContactFriction(ContactPenalty(cloth), speed=0.0),
-        lambda cloth: AreaBarrier(cloth, threshold=float("nan")),
         lambda cloth: Inertia(cloth, float("inf")),
     ],
 )

@@ -11,7 +11,7 @@ import pytest
 from skfem import Basis, BilinearForm, ElementTriP1, ElementVector, LinearForm, MeshTri
 
 from reference_sim import Cloth, Material, Potential
-from reference_sim.energies import AreaBarrier, Gravity, StretchSpring, StretchStVK
+from reference_sim.energies import Gravity, StretchSpring, StretchStVK
 from tests.reference_sim.meshes import patch, random_rotation
 
 MATERIAL = Material()
@@ -93,15 +93,6 @@ def test_springs_a_tenth_longer_have_the_energy_and_the_force_of_the_formula():
     value, gradient = StretchSpring(cloth).value_and_gradient(1.1 * cloth.rest_positions)
     assert value == pytest.approx(15 * (0.03**2 + 0.04**2 + 0.05**2), rel=1e-12)
     assert gradient[0] == pytest.approx([-30 * 0.03, -30 * 0.04, 0], rel=1e-12)
-
-
-def test_a_triangle_of_a_quarter_of_its_area_has_the_energy_and_the_force_of_the_area_barrier():
-    """With sides of half their length q = 1/16, below q0 = 0.1; kappa A = 6 J, and dq/ds = 4 s^3 = 0.5."""
-    cloth = triangle_of_3_4_5()
-    rest = cloth.rest_positions
-    value, gradient = AreaBarrier(cloth).value_and_gradient(0.5 * rest)
-    assert value == pytest.approx(6 * 0.0375**2 * np.log(1.6), rel=1e-12)
-    assert np.vdot(gradient, rest) == pytest.approx(-3 * (0.075 * np.log(1.6) + 0.0225), rel=1e-12)
 
 
 def test_flat_membrane_without_hinges_bends_for_nothing():

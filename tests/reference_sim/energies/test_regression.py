@@ -17,9 +17,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from reference_sim import Cloth, Material, Obstacle, Trajectory, simulate
+from reference_sim import Cloth, Obstacle, Trajectory, simulate
 from reference_sim.energies import (
-    AreaBarrier,
     BendHinge,
     ContactFriction,
     ContactPenalty,
@@ -76,14 +75,6 @@ def ball() -> Trajectory:
     return simulate(cloth, energies, frames=6, obstacle=obstacle, guess="previous", tolerance=TOLERANCE)
 
 
-def squeezed() -> Trajectory:
-    """Started at 40 % of its width, where the area barrier takes part; soft, in short steps."""
-    cloth = Cloth(*sheet(), Material(young_modulus=20e3))
-    energies = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), AreaBarrier(cloth, threshold=0.2)]
-    start = cloth.rest_positions * [0.4, 1.0, 1.0]
-    return simulate(cloth, energies, frames=6, dt=1 / 600, start=start, tolerance=TOLERANCE)
-
-
 def carried() -> Trajectory:
     """A sheet on a ball that moves and turns below it, sub-stepped; samples meet only what is near at rest.
 
@@ -106,7 +97,7 @@ def rotation_about_y(angle: float) -> np.ndarray:
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
 
-SCENES = {scene.__name__: scene for scene in (free_fall, hanging, springs, ball, squeezed, carried)}
+SCENES = {scene.__name__: scene for scene in (free_fall, hanging, springs, ball, carried)}
 
 
 def computed(name: str) -> dict[tuple[str, int, str], float]:
