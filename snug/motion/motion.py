@@ -1,4 +1,4 @@
-"""Motions, and operations on one: spread arms, resample, place, turn, mirror, compare poses.
+"""Motions, and operations on one: spread arms, resample, place, turn, mirror.
 
 A motion follows the convention of `snug.body.parametric_body`: y up, facing +z at first, standing at
 translation zero. Motions come from `snug.motion.library` or `snug.motion.files`.
@@ -12,7 +12,6 @@ import numpy as np
 
 from snug.body.skeleton import (
     JOINT,
-    JOINT_NAMES,
     axis_angles,
     joint_positions,
     rotation_matrices,
@@ -202,32 +201,6 @@ def mirror_motion(motion: Motion) -> Motion:
         poses=motion.poses[:, twin] * [1.0, -1.0, -1.0],
         translations=motion.translations * [-1.0, 1.0, 1.0],
     )
-
-
-def nearest_pose(poses: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return how far each pose (T, 24, 3) is from the nearest of the others (N, 24, 3): (T,) [rad].
-
-    The mean over the body's joints, hands aside, of the geodesic angle between their rotations. For the
-    root it is the angle between the two upward directions: which way a body faces is no difference.
-    """
-    up, turns = _up_and_turns(poses)
-    other_up, other_turns = _up_and_turns(others)
-    nearest = np.empty(len(poses))
-    for frame in range(len(poses)):
-        total = np.arccos(np.clip(other_up @ up[frame], -1.0, 1.0))
-        cosines = np.abs(np.einsum("njq,jq->nj", other_turns, turns[frame]))
-        total += 2.0 * np.arccos(np.minimum(cosines, 1.0)).sum(axis=1)
-        nearest[frame] = total.min() / (1 + turns.shape[1])
-    return nearest
-
-
-def _up_and_turns(poses: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return upward directions in the root's axes (T, 3), and quaternions (T, 21, 4) of the other joints."""
-    from scipy.spatial.transform import Rotation  # slow to load; names are listed without
-
-    turning = [JOINT[name] for name in JOINT_NAMES[1:] if not name.endswith("hand")]
-    quaternions = Rotation.from_rotvec(poses[:, turning].reshape(-1, 3)).as_quat()
-    return rotation_matrices(poses[:, 0])[:, 1], quaternions.reshape(len(poses), len(turning), 4)
 
 
 def arm_clearance(motion: Motion) -> np.ndarray:

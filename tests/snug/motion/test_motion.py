@@ -7,7 +7,6 @@ from snug.body.skeleton import (
     JOINT,
     PARENTS,
     REST_JOINTS,
-    axis_angles,
     joint_positions,
     rotation_matrices,
     sole_points,
@@ -20,7 +19,6 @@ from snug.motion.motion import (
     MotionError,
     arm_clearance,
     clear_arms,
-    nearest_pose,
     place,
     resample,
     spread_arms,
@@ -100,25 +98,6 @@ def test_walk_has_the_published_speed_and_planted_feet(library):
     speeds = np.linalg.norm(np.diff(balls[..., [0, 2]], axis=0), axis=-1) * 30.0
     # At every moment one foot is down; it slides slowly compared with the body.
     assert np.median(speeds.min(axis=1)) < 0.25 * speed
-
-
-def test_the_nearest_pose_is_the_mean_angle_of_joints_whatever_the_heading():
-    poses = 0.4 * np.random.default_rng(0).normal(size=(3, 24, 3))
-
-    def turned(joint, by, before=False):
-        """The poses with one joint turned, in its own axes or before the rotation that it has."""
-        turn, others = rotation_matrices(np.array(by)), poses.copy()
-        rotations = rotation_matrices(poses[:, joint])
-        others[:, joint] = axis_angles(turn @ rotations if before else rotations @ turn)
-        return others
-
-    assert nearest_pose(turned(0, [0.0, 2.0, 0.0], before=True), poses) == pytest.approx(0.0, abs=1e-6)
-    bent = turned(JOINT["left_elbow"], [0.3, 0.0, 0.4])
-    bent[:, JOINT["left_hand"]] += 1.0  # hands are left out
-    assert nearest_pose(bent, poses) == pytest.approx(0.5 / 22, abs=1e-6)
-    up, tilt = rotation_matrices(poses[:, 0])[:, 1], [0.2, 0.0, 0.0]
-    leaning = np.arccos(np.sum(up * (up @ rotation_matrices(np.array(tilt))), axis=1))
-    assert nearest_pose(turned(0, tilt), poses) == pytest.approx(leaning / 22, abs=1e-6)
 
 
 @pytest.mark.parametrize(
