@@ -104,7 +104,7 @@ def latex_table(run: Run, table: Table) -> str:
     sides = "".join("p{2.7cm}" if column.text else "r" for column in table.columns)
     return "\n".join([
         "% Needs \\usepackage{booktabs}.", "\\begin{table*}", "\\centering\\scriptsize",
-        f"\\setlength{{\\tabcolsep}}{{2pt}}\n\\caption{{{latex(table.caption)}}}",
+        f"\\setlength{{\\tabcolsep}}{{2pt}}\n\\caption{{{latex(table.caption)}}}\\smallskip",
         f"\\begin{{tabular}}{{{sides}}}", "\\toprule", lines[0], "\\midrule", *lines[1:],
         "\\bottomrule", "\\end{tabular}", "\\end{table*}", "",
     ])  # fmt: skip
