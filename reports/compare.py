@@ -19,24 +19,15 @@ EXAMPLES = """examples:
   python -m reports.compare before after --without-times         beside other work on the machine
   python -m reports.compare before after --shared                of what both runs have
 
-What counts as a change:
-  a mean   beyond 2 % of an energy and 5 % of another answer, with p below 0.05, corrected by Holm for all
-           means compared, and more than the uncertainties of both runs together (column uncertainty; an
-           answer of B counts as no less certain than A's). Where
-           nothing was repeated, three times the uncertainties decide in place of p. Of total and gravity,
-           whose zero is a choice, 2 points of relative excess.
-  a motion of a garment: so, over its seeds, whose scatter is pooled over all motions; p is corrected for all
-           of these tests. Without seeds, beyond three times the uncertainties.
-  a time   repeated: all of its interval beyond 15 %, on the same hardware; memory likewise. Taken once:
-           beyond a factor of 2; what lies between is counted, and so is cost/frame_worst, of one frame.
-  a check  one that passed fails, or is off by more than A's tolerance whatever B says, or the other way
-           round; so with stress tests, whatever --metrics says.
-  a cell   one that came to its end no longer does, or the other way round; likewise.
-  a loss   methods, motions, seeds and metrics that A has and B has not.
-A network of which B has one seed and A more is judged, scene by scene, by the prediction interval of A's
-seeds (with --shared, or the other seeds are gone); with one seed in both it is not judged: how far another
-seed moves it is unknown. A metric's declaration says which side is worse; of a correlation or amplitude
-it is what lies farther from the reference's own; another metric without a better side is at most changed.
+What counts as a change (docs/outputs.md has the rules in full):
+  a mean   beyond 2 % of an energy and 5 % of another answer, with p below 0.05 by Holm
+           and beyond the uncertainties of both runs; of a garment also motion by motion
+  a time   repeated: all of its interval beyond 15 %, on the same hardware; once: a factor of 2
+  a check  one that passes in one run alone, or is off by more than A's tolerance
+  a cell   one that comes to its end in one run alone
+  a loss   methods, motions, seeds and metrics that A has and B has not
+A network with one seed in B and more in A is judged by the prediction interval of A's seeds.
+
 exit status: 0 nothing is worse or gone; 1 something is; 2 a folder is no run, or its results.csv is not of
   the digest in run.json, or the two share nothing or differ in preset, sizes, body or garment."""
 

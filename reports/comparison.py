@@ -344,7 +344,8 @@ def compare(
     alone = set(drawn[1]["method"])
     kept = [frame[~(frame["seeded"] & frame["method"].isin(alone))] for frame in kept]
     judged, compared, not_judged = _means(one, *_without_more_noise(*kept), basis=cells[0])
-    of_one_seed = changed_scenes(*_with_known_zero(one, *drawn, basis=cells[0]), _metrics(one))
+    earlier, later = _with_known_zero(one, *drawn, basis=cells[0])
+    of_one_seed = changed_scenes(earlier, later, _metrics(one))
     order = (GONE, WORSE, BETTER, OTHER)
     changes = sorted(
         [*lost, *ended, *judged, *of_one_seed], key=lambda change: order.index(change.verdict)

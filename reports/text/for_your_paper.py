@@ -53,7 +53,7 @@ def paper_table(run: Run) -> Table:
     for method in run.ordered(usable["method"]):
         of_method = usable[usable["method"] == method]
         common = excess_of(run, excesses, method) if method != run.reference else None
-        effects = [own_excess_of(run, rows, method), common and common.effect]
+        effects = [own_excess_of(run, rows, method), common.effect if common else None]
         effects += [_mean(rows, method, metric) for metric in metrics]
         counts = of_method["scene"].map(recording_of).nunique(), of_method["seed"].nunique()
         lines.append((method, *counts, *(effect and _cell(effect) for effect in effects)))

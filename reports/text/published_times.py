@@ -39,7 +39,7 @@ def time_rows(costs: Sequence[tuple[Run, Table]], methods: Sequence[str]) -> lis
             here = [number(mean.value if isinstance(mean, Mean) else None) for mean in means]
             measured[str(method)] = run.label(str(method)), *here, number(many.get(method))
     known = {name: rows.to_numpy().tolist() for name, rows in published.groupby("method", sort=False)}
-    rows = [HEADS]
+    rows: list[tuple[str, ...]] = [HEADS]
     for name in dict.fromkeys([*methods, *(name for name in known if name not in measured)]):
         label, *here = measured.get(name, (name, *[DASH] * 3))
         rows += [(label, *how, *here) for _, *how in known.get(name, [[name, *[DASH] * 3]])]
