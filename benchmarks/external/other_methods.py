@@ -21,39 +21,48 @@ if TYPE_CHECKING:
 
 THICKNESS = 4.7e-4  # [m], by which HOOD and ContourCraft multiply Lame's constants [Pa]
 MESHES = """\
-Scene {scene} for HOOD (commit a65f75b) and ContourCraft (3095acd): {frames} frames at {fps:g} a second,
-metres, y up, as theirs. The garment is that of frame 0, at rest, and its rest shape for them. garment.obj is
-to look at: a garment.pkl that HOOD makes of it has the vertices in another order.
+Scene {scene} for HOOD (commit a65f75b) and ContourCraft (3095acd).
+{frames} frames at {fps:g} a second; metres, y up, as theirs.
+The garment is that of frame 0, at rest; for them it is the rest shape.
+garment.obj is to look at: HOOD would put its vertices in another order.
 
-1. Copy these files to fromanypose/ of their data, and there, with their code on PYTHONPATH, add the coarse
-   edges, which their reader cannot: it gives the function an argument too many.
+1. Copy these files to fromanypose/ of their data. Their reader cannot add
+   the coarse edges (an argument too many), so do it with their code:
      import pickle; from utils.mesh_creation import GarmentCreator
      garment = pickle.load(open("garment.pkl", "rb"))
      GarmentCreator(None, None, None, None).add_coarse_edges(garment)
      pickle.dump(garment, open("garment.pkl", "wb"))
-2. In configs/aux/from_any_pose.yaml, below the runner, set the step and the material, which is sampled
-   otherwise; Lame's constants [Pa] are ours [N/m] over {thickness} m:
+2. In configs/aux/from_any_pose.yaml, below the runner, set step and
+   material (else sampled; ours in N/m over {thickness} m, in Pa):
      regular_ts: {dt:.9g}
-     material: density_override {density:.6g}, lame_mu_override {mu:.6g},
-       lame_lambda_override {lame_lambda:.6g}, bending_coeff_override {bending:.6g}
-3. Run Inference_from_any_pose.ipynb (HOOD) or Inference_from_mesh_sequence.ipynb (ContourCraft), a mesh
-   sequence, with these two pickles and without n_steps. It writes temp/output_m.pkl.
-4. python -m benchmarks.score {method}=output_m.pkl --scene {scene}  (--set, ... of the export)
+     material:
+       density_override {density:.6g}, bending_coeff_override {bending:.6g}
+       lame_mu_override {mu:.6g}, lame_lambda_override {lame_lambda:.6g}
+3. Run Inference_from_any_pose.ipynb (HOOD) or
+   Inference_from_mesh_sequence.ipynb (ContourCraft) with both pickles and
+   without n_steps. It writes temp/output_m.pkl.
+4. With the --set, --garment, --body and --motions of the export:
+   python -m benchmarks.score {method}=output_m.pkl --scene {scene}
 """
 NCS = """\
-Scene {scene} for Neural Cloth Simulation (commit 8465ec5): {frames} frames at {fps:g} a second, metres, y up,
-as theirs. Its skin has no pose correctives, as that of an SMPL file has. The settings are what differs from
-their smpl.json: their frames have the rate fps; their areas of faces are twice the areas, so Lame's
-constants are half of ours; and they take no half of bending, so it is twice ours. train.txt names this
-motion alone: for a fair comparison list training motions there, of other exports.
+Scene {scene} for Neural Cloth Simulation (commit 8465ec5).
+{frames} frames at {fps:g} a second; metres, y up, as theirs.
+The settings are what differs from their smpl.json: the rate; Lame's
+constants, halved, for their areas of faces are doubled; bending, twice, for
+they take no half. train.txt names this motion alone: for a fair comparison
+list there the training motions of other exports.
 
-1. cp -r body_models data ncs NeuralClothSim/; cd NeuralClothSim/ncs; and in Python there:
-     import json; ours, theirs = (json.load(open(f"configs/{{n}}.json")) for n in ("{name}", "smpl"))
+1. cp -r body_models data ncs NeuralClothSim/; cd NeuralClothSim/ncs
+   and in Python there:
+     import json
+     ours, theirs = (json.load(open(f"configs/{{n}}.json")) for n in ("{name}", "smpl"))
      whole = {{key: {{**theirs[key], **ours.get(key, {{}})}} for key in theirs}}
      json.dump(whole, open("configs/{name}.json", "w"))
 2. python train.py --config configs/{name}.json --gpu_id 0
-3. python predict.py --config configs/{name}.json --gpu_id 0     writes ../results/{name}/garment.pc2
-4. python -m benchmarks.score authors-ncs=garment.pc2 --scene {scene}  (--set, ... of the export)
+3. python predict.py --config configs/{name}.json --gpu_id 0
+   writes ../results/{name}/garment.pc2
+4. With the --set, --garment, --body and --motions of the export:
+   python -m benchmarks.score authors-ncs=garment.pc2 --scene {scene}
 """
 
 
