@@ -163,7 +163,8 @@ def _differences(metric: Metric, rows: pd.DataFrame) -> pd.DataFrame:
     """
     values, run = rows["value"].to_numpy(), rows["run"].to_numpy()
     relative = metric.name.startswith("relative_excess/")
-    positive = not (relative or metric.arbitrary_zero) and values.min() > 0.0
+    signed = relative or metric.arbitrary_zero or metric.name.endswith("correlation")
+    positive = not signed and values.min() > 0.0
     scaled = np.log(values) if positive else values
     places, scenes = pd.factorize(rows["scene"], sort=True)
     cells = 2 * places + run
