@@ -95,6 +95,7 @@ BLOCKS: tuple[Heading | Figure | TableBlock, ...] = (
     TableBlock("cost"),
     Heading("Findings"),
     TableBlock("relative_excess"),
+    TableBlock("excess_by_time_step"),
     TableBlock("errors_in_spreads"),
     TableBlock("findings", most=40),
     TableBlock("ablation_effects"),

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import pandas as pd
 
 from benchmarks.metric import Metric
+from benchmarks.results.protocol import STARTS
 from reports.finished_run import Run
+from reports.statistics.effects import EXCESS, off_scale
 from reports.statistics.means_and_spreads import AT_REFERENCE, in_spreads
 from reports.statistics.outcomes import check_name, checks, stress_tests, tolerances_away
 from reports.statistics.paper_claims import judged
@@ -72,11 +75,13 @@ EXCESS_NOTE = (
 def relative_excess(run: Run) -> list[Table]:
     """Tabulate the relative excess of each method over the motions of a garment, and by time step."""
     zero = {*run.with_role("reference", "reference-variant"), SKINNING}
+    excesses: dict[tuple[str, str], Excess] = {}
     lines: list[tuple[Cell, ...]] = []
     for garment in run.garments(run.garment_rows):
         rows = with_relative_excess(run, run.garment_rows[run.garment_rows["garment"] == garment])
         for method in run.ordered(set(rows[rows["usable"]]["method"]) - zero):
             if excess := excess_of(run, rows, method):
+                excesses[garment, method] = excess
                 lines.append((garment, method, own_excess_of(run, rows, method), *_cells_of(excess)))
     columns = (
         GARMENT, METHOD, Column("own", "In own energies", "%", digits=2),
@@ -91,7 +96,28 @@ def relative_excess(run: Run) -> list[Table]:
         "(geometric, with its interval) and mean: over independent sources and seeds. Recorded, others: "
         "typical of the library's recordings, and of other motions. Pooled: ratio of the sums over motions."
     )
-    return table("relative_excess", columns, lines, caption, grouped_by=("garment",), note=EXCESS_NOTE)
+    means = table("relative_excess", columns, lines, caption, grouped_by=("garment",), note=EXCESS_NOTE)
+    return [*means, *_by_time_step(run, excesses)]
+
+
+def _by_time_step(run: Run, excesses: Mapping[tuple[str, str], Excess]) -> list[Table]:
+    """Tabulate the typical relative excess, (garment, method) -> one, against each smaller time step."""
+    members = [name for name in run.reference_family if name not in STARTS[1]]
+    lines: list[tuple[Cell, ...]] = []
+    for key, excess in excesses.items():
+        value, against = excess.effect.value, excess.effect.against
+        moved = {name: float(off_scale(value + change, EXCESS)) for name, change in against.items()}
+        if moved:
+            lines.append((*key, excess.typical, *map(moved.get, members)))
+    columns = (
+        GARMENT, METHOD,
+        *(Column(name, run.label(name), "%", digits=2) for name in (run.reference, *members)),
+    )  # fmt: skip
+    caption = (
+        "Typical relative excess against each simulation in the reference's place. Below zero: less total "
+        "energy than that simulation."
+    )
+    return table("excess_by_time_step", columns, lines, caption, grouped_by=("garment",))
 
 
 def _cells_of(excess: Excess) -> tuple[Cell, ...]:

@@ -59,3 +59,16 @@ def test_means_are_over_sources_recorded_ones_apart_and_the_pooled_share_over_mo
     assert shown["typical"].shown == pytest.approx(np.sinh((recorded + np.arcsinh(60.0)) / 2.0))
     assert shown["mean"] == pytest.approx((15.0 + 60.0) / 2.0)
     assert shown["pooled"] == pytest.approx(100.0 * (10.0 + 20.0 + 180.0) / 500.0)
+
+
+def test_a_method_with_less_energy_than_a_finer_simulation_is_below_zero_against_it():
+    energies = {"simulation": 1.0, "simulation-dt/4": 1.4, "skinning": 2.4, "snug": 1.2, "pbns": 1.6}
+    rows = [
+        row(f"tshirt/{clip}", name, "energy/total", x) for name, x in energies.items() for clip in "ab"
+    ]
+    _, made = relative_excess(run_of(rows))
+    assert [column.name for column in made.columns[2:]] == ["simulation", "simulation-dt/4"]
+    shown = {method: numbers for _, method, *numbers in made.rows}
+    assert shown == {
+        "snug": pytest.approx([100 * 0.2 / 1.4, -20.0]), "pbns": pytest.approx([100 * 0.6 / 1.4, 20.0])
+    }  # fmt: skip
