@@ -13,7 +13,13 @@ import numpy as np
 
 from reference_sim.cloth import MeshError
 from reference_sim.geometry.closest_point import Closest, FaceSearch, Listed
-from reference_sim.geometry.surface import carry, faces_around, plane_normals, winding_numbers
+from reference_sim.geometry.surface import (
+    TANGENT_BALL,
+    carry,
+    faces_around,
+    plane_normals,
+    winding_numbers,
+)
 from reference_sim.geometry.topology import check_closed
 
 DEFAULT_REGION = 0.20  # [m]
@@ -152,13 +158,21 @@ class Obstacle:
         self._last[kind] = closest.faces, samples, home
         return closest
 
-    def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
+    def planes(
+        self,
+        points: np.ndarray,
+        frame: int,
+        rest_points: np.ndarray | None = None,
+        *,
+        margin: float | None = None,
+    ) -> Planes:
         """Return contact planes at `frame`.
 
         The plane goes through the closest allowed point of the surface; its normal points from there to
         the sample (from the sample, when that is inside), which makes n.(x - c) the signed distance at
         the sample's own position. Beyond the border of the allowed faces it fades: see
-        `surface.plane_normals`.
+        `surface.plane_normals`. With `margin` [m], as contact gives it, no plane beyond
+        TANGENT_BALL touches a sample that is outside the whole surface and farther from it than that.
 
         points (S, 3) [m]: samples. rest_points (S, 3) [m]: the samples at rest, for the rule of regions.
         """
@@ -169,17 +183,54 @@ class Obstacle:
             points, closest.points, closest.faces, closest.barycentric, vertices, self.faces,
             *self._around, normals,
         )  # fmt: skip
+        if margin is not None:
+            self._turn_from_free(points, vertices, closest.points, closest.faces, normals, margin)
         return Planes(closest.points, normals, closest.faces, closest.barycentric)
+
+    def _turn_from_free(
+        self,
+        points: np.ndarray,
+        vertices: np.ndarray,
+        closest: np.ndarray,
+        faces: np.ndarray,
+        normals: np.ndarray,
+        margin: float,
+    ) -> None:
+        """Turn the normals (S, 3) of planes that touch points (S, 3) [m] which are free of the surface.
+
+        Free is what lies outside the whole surface, farther away than `margin` [m]. Only samples more
+        than TANGENT_BALL from their closest allowed faces, below or beside them, are searched.
+        """
+        offsets = points - closest
+        distances = np.linalg.norm(offsets, axis=1)
+        heights = np.einsum("si,si->s", normals, offsets)
+        # Tilted planes too, which would be met within the step.
+        doubtful = np.flatnonzero((distances > TANGENT_BALL) & (heights < 0.99 * distances))
+        if len(doubtful) == 0:
+            return
+        assert self._search is not None
+        some = points[doubtful]
+        nearest = self._search.nearest(some, hints=faces[doubtful]).points
+        nearest_distances, away = np.linalg.norm(some - nearest, axis=1), distances[doubtful]
+        # Straight below the closest face of all is inside.
+        unsure = (nearest_distances < 0.999999 * away) | (np.abs(heights[doubtful]) < 0.99 * away)
+        free = (nearest_distances > margin) & unsure
+        free[free] = winding_numbers(vertices, self.faces, some[free]) <= 0
+        turned = doubtful[free]
+        normals[turned] = offsets[turned] / distances[turned, None]
 
     def transported(
         self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None
     ) -> np.ndarray:
         """Return points (N, 3) [m] of frame - 1 moved along with the body, each beside its nearest face.
 
-        The best known initial guess for a garment. At frame 0 nothing has moved.
+        The best known initial guess for a garment. At frame 0 nothing has moved. Points that are all
+        farther away than DEFAULT_REGION stay: carried on so long a lever, cloth would be torn.
         """
         before = max(frame - 1, 0)
         closest = self._nearest(points, before, rest_points)
+        if np.linalg.norm(points - closest.points, axis=1).min(initial=np.inf) > DEFAULT_REGION:
+            return points.copy()
         carried = np.empty_like(closest.points)
         carry(
             points, closest.points, closest.faces, closest.barycentric, self.at(before), self.at(frame),

@@ -98,7 +98,14 @@ class RoundBody:
         c, s = np.cos(frame * self.turn), np.sin(frame * self.turn)
         return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
-    def planes(self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None) -> Planes:
+    def planes(
+        self,
+        points: np.ndarray,
+        frame: int,
+        rest_points: np.ndarray | None = None,
+        *,
+        margin: float | None = None,
+    ) -> Planes:
         """Return tangent planes below points (S, 3) [m] in a frame, with places on the turning skin."""
         from reference_sim.obstacle import Planes
 

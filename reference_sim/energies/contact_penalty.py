@@ -286,7 +286,7 @@ class ContactPenalty(Energy):
         if step.obstacle is None:
             raise ValueError("ContactPenalty needs an obstacle: pass one to simulate() or drop the term")
         samples = self.sample_matrix @ step.guess
-        planes = step.obstacle.planes(samples, step.frame, self.rest_samples)
+        planes = step.obstacle.planes(samples, step.frame, self.rest_samples, margin=self.margin)
         self.planes, self.points, self.normals = planes, planes.points, planes.normals
         self.step = step
 
