@@ -25,7 +25,6 @@ from benchmarks.runner.measurements import measured
 from benchmarks.scene import Dressed
 from reference_sim import Trajectory
 from reference_sim.files.mesh_files import read_mesh
-from reference_sim.trajectory import write_obj
 from snug.networks.dressed_body import DressedBody
 from tests.benchmarks.runner.tasks_by_hand import assets_of, dressed_scene, prepared
 from tests.snug.training.dressing import swaying, tube_dress
@@ -207,12 +206,6 @@ def test_energies_and_curvature_follow_from_the_exported_files_alone(home, name)
             np.testing.assert_allclose(value, ours[term][frame], rtol=1e-10, err_msg=f"{term}, {frame}")
         np.testing.assert_allclose(sum(energies.values()), ours["total"][frame], rtol=1e-10)
         np.testing.assert_allclose(files.mean_curvature(x), curvature[frame], rtol=1e-10)
-
-
-def test_a_uv_of_corners_is_written_into_the_mesh(tmp_path):
-    positions, faces = np.eye(3), np.array([[0, 1, 2]])
-    write_obj(tmp_path / "a.obj", positions, faces, np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 0.5]]))
-    assert (tmp_path / "a.obj").read_text().endswith("vt 0.0 0.5\nf 1/1 2/2 3/3\n")
 
 
 def test_scenes_without_a_body_are_exported_too(tmp_path, capsys):

@@ -58,10 +58,6 @@ def test_how_one_method_stands_to_another(far, changed, expected):
     assert standing(far, far.p_value()) == expected
 
 
-def test_a_corrected_p_value_above_the_level_is_inconclusive():
-    assert standing(FAR, 0.04) == MORE and standing(FAR, 0.06) == OPEN
-
-
 def test_one_reading_of_a_clock_gives_no_verdict_and_one_of_a_size_does():
     rows = [
         row("tshirt/walk", method, metric, value)
@@ -77,12 +73,6 @@ def test_one_reading_of_a_clock_gives_no_verdict_and_one_of_a_size_does():
     )
     assert (standing(time, None), why_open(time)) == (OPEN, ": no range")
     assert (standing(size, None), why_open(size)) == (LESS, "")
-
-
-@pytest.mark.parametrize(("factor", "expected"), [(100.0, LESS), (200.0, MORE), (148.4, TIED)])
-def test_a_claimed_factor_moves_the_effect(factor, expected):
-    far = replace(FAR, value=-5.0)  # a factor of 148
-    assert standing(far, far.p_value(factor), factor) == expected
 
 
 def test_a_time_step_with_another_sign_is_named():

@@ -99,7 +99,6 @@ def test_closed_forms_hide_no_window_that_is_no_number():
     ("options", "message"),
     [
         ({"pose_input": "quaternion"}, "pose_input='quaternion'"),
-        ({"terms": ("strain", "gale")}, "'gale'"),
         ({"momentum": 0.9}, "'momentum' is unknown or missing"),
         ({"physics_weight": -1.0}, "physics_weight=-1.0: must not be negative"),
     ],
