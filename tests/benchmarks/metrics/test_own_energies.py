@@ -8,10 +8,8 @@ import numpy as np
 import pytest
 
 from benchmarks.assets import embedded_motions, open_assets
-from benchmarks.method import Training
 from benchmarks.methods import find_method
 from benchmarks.methods.own_energies import (
-    DEFAULT,
     OWN_REFERENCES,
     STATIC,
     own_energies,
@@ -22,7 +20,6 @@ from benchmarks.methods.simulation import Simulation
 from benchmarks.metrics.own_energies import NAME, compare, measure
 from benchmarks.presets import find_preset
 from snug.kinds import KINDS
-from snug.named_recipes import PAPER
 from tests.benchmarks.plan.planned import planned
 from tests.benchmarks.runner.tasks_by_hand import dressed_scene, grouped, prepared
 
@@ -117,13 +114,3 @@ def test_the_simulation_joins_where_the_network_meets_the_reference():
     assert methods("simulation", "snug-paper") == ["simulation", "snug-paper", "simulation-paper"]
     assert methods("snug-paper") == ["snug-paper"]
     assert methods("simulation", "snug") == ["simulation", "snug"]
-
-
-def test_a_users_training_has_a_simulation_of_its_own_energies():
-    soft = dataclasses.replace(PAPER, contact_margin=0.001)
-    entry = dataclasses.replace(
-        find_method("snug"), name="soft", trained="soft", training=Training("snug", soft)
-    )
-    reference = own_reference(entry)
-    assert reference.name == "simulation-of-soft" and reference.options["contact_margin"] == 0.001
-    assert own_energies(reference) == own_energies(entry) != DEFAULT

@@ -71,11 +71,6 @@ def test_options_hold_before_the_file_and_their_paths_are_relative_to_where_one_
     assert list(study.parts) == ["speed"]
 
 
-def test_a_setting_is_a_field_and_a_value_of_toml_or_a_word():
-    assert parse_setting("rollouts.mine=a.npz") == {"rollouts": {"mine": "a.npz"}}
-    assert parse_setting("motions=clips/a b") == {"motions": "clips/a b"}
-
-
 @pytest.mark.parametrize("name", study_names())
 def test_every_study_of_the_package_has_a_question_and_can_be_planned(name):
     study = read_study(name)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import sys
 from contextlib import contextmanager, redirect_stdout
-from copy import copy
 from io import StringIO
 from pathlib import Path
 
@@ -171,7 +170,7 @@ def test_an_energy_of_a_file_can_be_trained_on_once_it_is_loaded(tmp_path):
 def test_own_energies_of_a_users_file_are_known_where_the_file_was_not_loaded(tmp_path):
     home = tmp_path / "draught.py"
     home.write_text(SCENE_FILE + "class Draught(Lift):\n    name = 'draught'\n")
-    recipe = copy(DEFAULT)
+    recipe = dataclasses.replace(DEFAULT, contact_margin=0.001)
     object.__setattr__(recipe, "terms", (*DEFAULT.terms, "draught"))  # as it comes to a task's process
     entry = MethodEntry(
         name="mine", description="", trained="mine", training=Training("snug", recipe), role="network",
@@ -180,6 +179,7 @@ def test_own_energies_of_a_users_file_are_known_where_the_file_was_not_loaded(tm
     assert own_energies(entry).terms == recipe.terms
     reference = own_reference(entry)
     assert reference.declared_in == str(home) and own_energies(reference) == own_energies(entry)
+    assert (reference.name, reference.options["contact_margin"]) == ("simulation-of-mine", 0.001)
 
 
 def test_a_method_brings_the_training_of_its_network(tmp_path):

@@ -95,13 +95,6 @@ def test_limbs_of_another_skeleton_point_where_its_own_do(tmp_path):
         np.testing.assert_allclose(motion.poses[:, JOINT[name]], 0.0, atol=1e-9)
 
 
-def test_the_path_is_scaled_by_the_length_of_the_legs(tmp_path):
-    text = bvh(WALK.poses, 2 * WALK.translations, 30.0, rest=2 * REST_JOINTS)
-    large = read(written(tmp_path / "a.bvh", text))
-    travelled = large.translations - large.translations[0]
-    np.testing.assert_allclose(travelled, WALK.translations - WALK.translations[0], atol=1e-6)
-
-
 @pytest.mark.parametrize(
     ("change", "words"),
     [
