@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pandas as pd
 
-from reference_sim.geometry.topology import covered_pixels
 from reference_sim.trajectory import Trajectory
 from reports.figures.plotting import DOTS, PAGE_WIDTH, Drawing, file_name, leading, new_figure, wrapped
 from reports.finished_run import Run, shown_seeds
@@ -99,7 +98,7 @@ def _paint(
     seen = camera.seen(surface.positions)
     scale = h / camera.height
     points = np.stack([w / 2.0 + scale * seen[:, 0], h / 2.0 - scale * seen[:, 1]], axis=1)
-    pixels, faces, weights = covered_pixels(points[surface.faces], w, h)
+    pixels, faces, weights = _covered(points[surface.faces], w, h)
     near = np.einsum("pk,pk->p", weights, seen[surface.faces[faces], 2]) + surface.lift
     np.maximum.at(depth, pixels, near)
     kept = near == depth[pixels]
@@ -110,6 +109,37 @@ def _paint(
     key, fill = (np.clip(normals @ (light / np.linalg.norm(light)), 0.0, 1.0) for light in (KEY, FILL))
     colours = np.broadcast_to(np.asarray(surface.colour, dtype=float), (len(seen), 3))
     image[pixels] = (0.36 + 0.72 * key + 0.16 * fill)[:, None] * (weights * colours[corners]).sum(axis=1)
+
+
+def _covered(corners: np.ndarray, w: int, h: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return for each pixel in each triangle (F,3,2) [pixels]: its number, the face, weights (P,3)."""
+    low = np.clip(np.floor(corners.min(axis=1)).astype(int), 0, [w, h])
+    high = np.clip(np.ceil(corners.max(axis=1)).astype(int), 0, [w, h])
+    first, ab, ac = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    area = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
+    seen = np.flatnonzero((high > low).all(axis=1) & (area != 0.0))  # from its edge one covers nothing
+    low, spans, first, area = low[seen], (high - low)[seen], first[seen], area[seen, None]
+    # Weights of the second and third corner are linear in the pixel: slopes and the value at the low
+    # corner.
+    slopes = [
+        np.stack([ac[seen, 1], -ac[seen, 0]], axis=1) / area,
+        np.stack([-ab[seen, 1], ab[seen, 0]], axis=1) / area,
+    ]
+    starts = [(slope * (low + 0.5 - first)).sum(axis=1) for slope in slopes]
+    counts = spans.prod(axis=1)
+    triangle = np.repeat(np.arange(len(seen)), counts)
+    place = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    y, x = np.divmod(place, spans[triangle, 0])
+    weights: list[np.ndarray] = []
+    for slope, start in zip(slopes, starts):
+        weight = start[triangle] + slope[triangle, 0] * x + slope[triangle, 1] * y
+        kept = weight >= 0.0
+        triangle, x, y = triangle[kept], x[kept], y[kept]
+        weights = [one[kept] for one in (*weights, weight)]
+    weights.insert(0, 1.0 - weights[0] - weights[1])
+    kept = weights[0] >= 0.0
+    triangle, x, y = triangle[kept], x[kept] + low[triangle[kept], 0], y[kept] + low[triangle[kept], 1]
+    return y * w + x, seen[triangle], np.stack([weight[kept] for weight in weights], axis=1)
 
 
 INERTIA = "energy/inertia"

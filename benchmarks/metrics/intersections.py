@@ -25,20 +25,17 @@ MOST_PAIRS = 200_000  # to be tested one by one, in seconds: more have only lost
 
 
 def measure_triangles(roll_out: RollOut) -> dict[str, float]:
-    """Return the share of triangles that intersect another [%], and contours [m] and volume [cm^3]."""
-    from benchmarks.metrics.self_intersections import self_intersections, volume_enclosed_again  # numba
+    """Return the share of triangles that intersect another [%] and the length of contours [m]."""
+    from benchmarks.metrics.self_intersections import self_intersections  # loads numba
 
     faces = roll_out.scene.cloth.faces
-    x = np.ascontiguousarray(roll_out.positions[roll_out.judged])
-    frames = [self_intersections(frame, faces) for frame in x]
-    values = {
+    frames = [
+        self_intersections(np.ascontiguousarray(x), faces) for x in roll_out.positions[roll_out.judged]
+    ]
+    return {
         "intersections/triangles": 100.0 * float(np.mean([hit.mean() for hit, _ in frames])),
         "intersections/contours": float(np.mean([length for _, length in frames])),
     }
-    if roll_out.scene.dressed is not None:
-        again = [volume_enclosed_again(frame, faces) for frame, (hit, _) in zip(x, frames) if hit.any()]
-        values["intersections/volume"] = 1e6 * sum(again) / max(len(frames), 1)
-    return values
 
 
 def measure_swept(roll_out: RollOut) -> dict[str, float]:
@@ -115,9 +112,6 @@ INTERSECTIONS = Measurements(
          "triangles that pass through another one of the same cloth, mean over frames"),
         ("intersections/contours", "m", "Contours",
          "length of the lines in which triangles of the cloth pass through others of it, mean over frames"),
-        ("intersections/volume", "cm^3", "Enclosed again",
-         "volume that a garment with closed openings encloses more than once or inside out, in frames in "
-         "which triangles pass through others; mean over frames"),
         ("intersections/swept", "1", "Swept",
          "pairs of a vertex and a triangle, or of two edges, of the cloth that pass through each other on "
          "straight ways between two frames; mean over 12 pairs of frames, needs ipctk"),

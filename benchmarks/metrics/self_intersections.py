@@ -11,38 +11,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reference_sim.geometry.topology import boundary_loops, covered_pixels
 from reference_sim.kernels.kernel_cache import njit
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from benchmarks.metric import Faces, Vertices
-
-
-LINES = 5e-3  # [m] between lines along x on which the cloth's crossings are found
-
-
-def volume_enclosed_again(x: Vertices, faces: Faces) -> float:
-    """Return the volume [m^3] that a cloth encloses more than once, or inside out.
-
-    That is the integral of how far its winding number is from 0 or 1, exact along the lines. Openings are
-    closed by triangles to the mean of their border, as by Liao et al. 2024 (SENC), whose loss is the volume
-    of these regions. Raises ValueError as boundary_loops.
-    """
-    for loop in boundary_loops(faces):
-        fan = np.column_stack([np.roll(loop, -1), loop, np.full(len(loop), len(x))])
-        x, faces = np.vstack([x, x[loop].mean(axis=0)]), np.vstack([faces, fan])
-    corners = (x[faces][:, :, 1:] - x[:, 1:].min(axis=0)) / LINES
-    width, height = np.ceil(corners.max(axis=(0, 1))).astype(int)
-    line, face, weights = covered_pixels(corners, width, height)
-    place = np.einsum("pk,pk->p", weights, x[faces[face], 0])
-    sides = corners[:, 1:] - corners[:, :1]
-    change = -np.sign(sides[:, 0, 0] * sides[:, 1, 1] - sides[:, 0, 1] * sides[:, 1, 0])[face]
-    order = np.lexsort((place, line))
-    around = np.cumsum(change[order])[:-1]  # zero behind the last of a line
-    wrong = np.maximum(around - 1.0, 0.0) + np.maximum(-around, 0.0)
-    return float(wrong @ np.diff(place[order])) * LINES**2
 
 
 def self_intersections(x: Vertices, faces: Faces) -> tuple[NDArray[np.bool_], float]:

@@ -19,7 +19,7 @@ DIGESTS = {
     "scenes": "88c6128b67b3dd78",
     "materials": "37f8eb4aecad748b",
     "motions": "dc71f7b3a0e629a9",
-    "metrics": "4e94c5eb52a01310",
+    "metrics": "8d678e8419e78ad3",
     "reference": "143d7369e2970032",
     "sampling": "01a71f93dd349175",
     "statistics": "bbdacc941ceaa26a",

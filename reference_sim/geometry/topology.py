@@ -148,34 +148,3 @@ def _check_shape(corner: np.ndarray, frame: int) -> None:
         volume = np.einsum("fi,fi->", corner[:, 0], normal) / 6
         if not volume > 0:
             raise MeshError(f"obstacle is inside out (volume {volume:.3g} m^3): reverse its faces")
-
-
-def covered_pixels(corners: Array, w: int, h: int) -> tuple[Index, Index, Array]:
-    """Return for each pixel in each triangle (F,3,2) [pixels]: its number, the face, weights (P,3)."""
-    low = np.clip(np.floor(corners.min(axis=1)).astype(int), 0, [w, h])
-    high = np.clip(np.ceil(corners.max(axis=1)).astype(int), 0, [w, h])
-    first, ab, ac = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-    area = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
-    seen = np.flatnonzero((high > low).all(axis=1) & (area != 0.0))  # from its edge one covers nothing
-    low, spans, first, area = low[seen], (high - low)[seen], first[seen], area[seen, None]
-    # Weights of the second and third corner are linear in the pixel: slopes and the value at the low
-    # corner.
-    slopes = [
-        np.stack([ac[seen, 1], -ac[seen, 0]], axis=1) / area,
-        np.stack([-ab[seen, 1], ab[seen, 0]], axis=1) / area,
-    ]
-    starts = [(slope * (low + 0.5 - first)).sum(axis=1) for slope in slopes]
-    counts = spans.prod(axis=1)
-    triangle = np.repeat(np.arange(len(seen)), counts)
-    place = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    y, x = np.divmod(place, spans[triangle, 0])
-    weights: list[Array] = []
-    for slope, start in zip(slopes, starts):
-        weight = start[triangle] + slope[triangle, 0] * x + slope[triangle, 1] * y
-        kept = weight >= 0.0
-        triangle, x, y = triangle[kept], x[kept], y[kept]
-        weights = [one[kept] for one in (*weights, weight)]
-    weights.insert(0, 1.0 - weights[0] - weights[1])
-    kept = weights[0] >= 0.0
-    triangle, x, y = triangle[kept], x[kept] + low[triangle[kept], 0], y[kept] + low[triangle[kept], 1]
-    return y * w + x, seen[triangle], np.stack([weight[kept] for weight in weights], axis=1)

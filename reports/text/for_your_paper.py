@@ -27,7 +27,7 @@ NAME = "for_your_paper"
 METRICS = (
     "penetration/surface",
     "intersections/triangles",
-    "intersections/volume",
+    "intersections/contours",
     "deformation/edges",
     "deformation/areas",
     "distance/rms",

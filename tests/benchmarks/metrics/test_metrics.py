@@ -13,7 +13,7 @@ from benchmarks.metrics.curvature import CurvatureSeries, histogram_distance
 from benchmarks.metrics.energy import energy_series
 from benchmarks.metrics.penetration_and_distances import measure_deformation, own_part_depth, penetration
 from benchmarks.metrics.scene_facts import inside_itself, measure_body
-from benchmarks.metrics.self_intersections import self_intersections, volume_enclosed_again
+from benchmarks.metrics.self_intersections import self_intersections
 from reference_sim import Cloth, Obstacle
 from tests.benchmarks.runner.tasks_by_hand import simulated, small_scene
 
@@ -133,25 +133,6 @@ def test_intersections_are_those_of_two_crossing_strips():
     assert length == pytest.approx(1.0 - 0.013, rel=1e-12)
     tent = flat + np.abs(flat[:, [0]] - 0.5) * [0.0, 0.0, 2.0]  # folded, and nowhere through itself
     assert not self_intersections(tent, faces)[0].any()
-
-
-def test_volume_enclosed_again_is_the_lens_of_two_spheres_and_all_of_one_inside_out():
-    x, faces = icosphere(4, 0.1)
-    middle = np.array([0.013, 0.0171, 0.0003])
-    x += middle
-    one = 4 / 3 * np.pi * 0.1**3
-    assert volume_enclosed_again(x, faces) == 0.0
-    assert volume_enclosed_again(x, faces[:, ::-1]) == pytest.approx(one, rel=1e-2)
-    both = np.concatenate([faces, faces + len(x)])
-    for distance in (0.1, 0.15):
-        lens = np.pi * (0.4 + distance) * (0.2 - distance) ** 2 / 12
-        pair = np.concatenate([x, x + np.array([0.6, 0.0, 0.8]) * distance])
-        assert volume_enclosed_again(pair, both) == pytest.approx(lens, rel=1e-2)
-    # A fan closes a hemisphere; half of a smaller sphere lies in it.
-    kept = faces[x[faces][:, :, 2].min(1) > middle[2] - 1e-9]
-    inner = np.concatenate([x, 0.5 * (x + middle)])
-    halves = np.concatenate([kept, faces + len(x)])
-    assert volume_enclosed_again(inner, halves) == pytest.approx(one / 16, rel=5e-2)
 
 
 def test_edges_and_areas_change_as_their_ratios_whichever_way():
