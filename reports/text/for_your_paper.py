@@ -25,14 +25,9 @@ from reports.tables.table import DASH, METHOD, Cell, Column, Table, column_texts
 
 NAME = "for_your_paper"
 METRICS = (
-    "penetration/surface",
-    "intersections/triangles",
-    "intersections/contours",
-    "deformation/edges",
-    "deformation/areas",
-    "distance/rms",
-    "dynamics/common_correlation",
-)
+    "penetration/surface", "intersections/triangles", "intersections/contours", "deformation/edges",
+    "deformation/areas", "distance/rms", "dynamics/common_correlation",
+)  # fmt: skip
 CITATION = "Neural garments versus a reference solver: a physics-validation benchmark"
 
 
@@ -63,13 +58,10 @@ def paper_table(run: Run) -> Table:
         counts = of_method["scene"].map(recording_of).nunique(), of_method["seed"].nunique()
         lines.append((method, *counts, *(effect and _cell(effect) for effect in effects)))
     columns = [
-        METHOD,
-        Column("motions", "Motions"),
-        Column("seeds", "Seeds"),
-        Column("own_excess", "Own excess", "%"),
-        Column("relative_excess", "Relative excess", "%"),
+        METHOD, Column("motions", "Motions"), Column("seeds", "Seeds"),
+        Column("own_excess", "Own excess", "%"), Column("relative_excess", "Relative excess", "%"),
         *map(metric_column, metrics),
-    ]
+    ]  # fmt: skip
     kept = [k for k, cells in enumerate(zip(*lines)) if any(cell is not None for cell in cells)]
     caption = (
         f"{run.first_garment or 'All scenes'}: means over independent sources of motion and over seeds, of "
@@ -106,29 +98,16 @@ def latex_table(run: Run, table: Table) -> str:
         _stacked(*column.title.replace(", ", " ").split(), f"[{column.unit}]" * bool(column.unit))
         for column in table.columns
     ]
-    body = [
-        [_stacked(cell["text"].removeprefix("+"), cell["spread"].replace(" to ", DASH)) for cell in line]
-        for line in zip(*columns)
-    ]
+    body = [[_stacked(cell["text"].removeprefix("+"), cell["spread"].replace(" to ", DASH)) for cell in line]
+        for line in zip(*columns)]  # fmt: skip
     lines = [f"\\raggedright {' & '.join(line)} \\\\[4pt]" for line in (heads, *body)]
     sides = "".join("p{2.7cm}" if column.text else "r" for column in table.columns)
-    return "\n".join(
-        [
-            "% Needs \\usepackage{booktabs}.",
-            "\\begin{table*}",
-            "\\centering\\scriptsize",
-            f"\\setlength{{\\tabcolsep}}{{2pt}}\n\\caption{{{latex(table.caption)}}}\\smallskip",
-            f"\\begin{{tabular}}{{{sides}}}",
-            "\\toprule",
-            lines[0],
-            "\\midrule",
-            *lines[1:],
-            "\\bottomrule",
-            "\\end{tabular}",
-            "\\end{table*}",
-            "",
-        ]
-    )
+    return "\n".join([
+        "% Needs \\usepackage{booktabs}.", "\\begin{table*}", "\\centering\\scriptsize",
+        f"\\setlength{{\\tabcolsep}}{{2pt}}\n\\caption{{{latex(table.caption)}}}\\smallskip",
+        f"\\begin{{tabular}}{{{sides}}}", "\\toprule", lines[0], "\\midrule", *lines[1:],
+        "\\bottomrule", "\\end{tabular}", "\\end{table*}", "",
+    ])  # fmt: skip
 
 
 def _stacked(*texts: str) -> str:
@@ -138,20 +117,10 @@ def _stacked(*texts: str) -> str:
 
 
 COMMANDS = {
-    "\\": r"\textbackslash{}",
-    "^": r"\textasciicircum{}",
-    "~": r"\textasciitilde{}",
-    "<": "$<$",
-    ">": "$>$",
-    "|": "$|$",
-    "−": "$-$",
-    "×": r"$\times$",
-    "∞": r"$\infty$",
-    DASH: "--",
-    "[": "{[}",
-    "]": "{]}",
+    "\\": r"\textbackslash{}", "^": r"\textasciicircum{}", "~": r"\textasciitilde{}", "<": "$<$", ">": "$>$",
+    "|": "$|$", "−": "$-$", "×": r"$\times$", "∞": r"$\infty$", DASH: "--", "[": "{[}", "]": "{]}",
     **{mark: f"\\{mark}" for mark in "&%$#_{}"},
-}
+}  # fmt: skip
 RAISED = str.maketrans("⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "-0123456789")
 
 
