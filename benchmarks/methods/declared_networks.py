@@ -150,15 +150,12 @@ RECIPES = tuple(
 )  # fmt: skip
 
 
-def _equal_data(
-    name: str, label: str, trained: str, mixed: int, *, converged: bool = False
-) -> MethodEntry:
+def _equal_data(name: str, label: str, trained: str, mixed: int) -> MethodEntry:
     """Declare a network trained as `trained`, on equal data: `mixed` augmented frames for each given one.
 
     The last training motion is held out. With every seed a network that simulated vertices teach gets the
-    same clips, simulated once; another mixes as many anew. Both have SNUG's number of steps or go on
-    until the held-out motion gets no better. Not timed: its run time is that of the network of the usual
-    data.
+    same clips, simulated once; another mixes as many anew. Both have SNUG's number of steps. Not timed:
+    its run time is that of the network of the usual data.
     """
     usual = TRAININGS[trained]
     recipe = replace(usual.recipe, name=f"{usual.recipe.name}-data-{mixed}")
@@ -167,29 +164,24 @@ def _equal_data(
         if usual.simulated
         else replace(usual, recipe=replace(recipe, mixed=float(mixed)))
     )
-    family = f"{name}-data" + "-converged" * converged
-    data = f"original data and {mixed} augmented frames for each" if mixed else "original data"
-    title = f"{label}, {mixed} augmented for each" if mixed else f"{label}, original data"
     return network(
-        f"{family}-{mixed}", title + ", converged" * converged,
-        f"{name} that learns from {data}" + ", until a held-out motion gets no better" * converged,
-        training=replace(training, steps_of="snug", held_out=1, converged=converged),
+        f"{name}-data-{mixed}", f"{label}, {mixed} augmented for each",
+        f"{name} that learns from original data and {mixed} augmented frames for each",
+        training=replace(training, steps_of="snug", held_out=1),
         role="ablation", batched=False, timed=False,
         reporting=Reporting(
-            family=family, level=float(mixed), base=f"{name}-data-{mixed}" if converged else trained,
-            pairing_group=name,
+            family=f"{name}-data", level=float(mixed), base=trained, pairing_group=name,
         ),
     )  # fmt: skip
 
 
 EQUAL_DATA = tuple(
-    _equal_data(name, label, trained, mixed, converged=converged)
-    for name, label, trained in (
+    _equal_data(*named, mixed)
+    for named in (
         ("snug", "SNUG", "snug"),
         ("supervised", "Supervised by vertices", "supervised-vertices"),
     )
-    for converged, numbers in ((False, (0, 1, 3, 12)), (True, (0, 12)))
-    for mixed in numbers
+    for mixed in (0, 1, 3, 12)
 )
 
 NETWORKS = (*NAMED, *RECIPES, *POST_PROCESSED, *EQUAL_DATA)

@@ -170,7 +170,6 @@ def test_dressed_rows_hold_every_metric_and_small_ones_what_they_have(run, rows,
                 or (on_body and method in ("skinning", "simulation")),
                 "dynamics/amplitude": answered,
                 "dynamics/common_amplitude": on_body,
-                "intersections/volume": on_body,
             }.items():
                 assert (metric in values) == has_it, (name, method, metric)
             if method == "simulation" and on_body:
