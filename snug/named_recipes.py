@@ -69,12 +69,10 @@ SUPERVISED_VERTICES = replace(
     remembered=False,
     mixed=0.0,
 )
-# Vertices alone cut into the body and stretch, so two energies are beside them. At 3 cm^2/J both parts
-# pull alike at the vertices of a network that learned these alone (gradients on training motion 07_01:
-# equal at 2.7; at its start at 5.1). No lambda is chosen by validation yet:
-# docs/notebook/supervised_weight.py.
+# Vertices alone cut into the body and stretch, so two energies are beside them, with the lambda of least
+# excess on validation motions: docs/notebook/training.md#supervision-with-strain-and-collision.
 SUPERVISED = replace(
-    SUPERVISED_VERTICES, name="supervised", terms=("strain", "collision"), physics_weight=3.0
+    SUPERVISED_VERTICES, name="supervised", terms=("strain", "collision"), physics_weight=300.0
 )
 # A constant shape needs no recurrence of its own: the fit is a mean drape, see santesteban2019.
 SANTESTEBAN2019 = replace(SUPERVISED_VERTICES, name="santesteban2019", learning_rate=5e-4)
