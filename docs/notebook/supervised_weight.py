@@ -25,7 +25,7 @@ from snug.motion.library import VALIDATION
 from snug.named_recipes import SUPERVISED
 from snug.networks.tensor_file import read_header
 
-WEIGHTS = (0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)  # lambda [cm^2/J]; near 3 both parts pull alike
+WEIGHTS = (0.0, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0)  # cm^2/J
 SOLVER = "fast-lbfgs-10"  # simulates what is learned from
 SCENES = ",".join(f"tshirt/{motion}" for motion in VALIDATION[:8])
 
