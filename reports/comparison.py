@@ -245,9 +245,8 @@ def gone(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
 def endings(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
     """Return cells, checks and stress tests that ended well in one run alone; each cell once."""
     both = one.merge(other, on=CELL, suffixes=("", "_other"))
-    off = (both["value_other"] - both["expected"]).abs() > both[
-        "tolerance"
-    ]  # whatever the later run says
+    # Whatever the later run says.
+    off = (both["value_other"] - both["expected"]).abs() > both["tolerance"]
     both.loc[off & (both["status_other"] == "ok"), ["status_other", "reason_other"]] = "failed", "off"
     # A cell that failed has one row, of a metric that it need not have where it ends well.
     cells = _worst(one).merge(_worst(other), on=CELL[:3], suffixes=("", "_other"))

@@ -175,7 +175,7 @@ def solve_sheet(**options: Any) -> Measurement:
 @cache
 def warm_up() -> None:
     """Compile the kernels of all steps, however long that takes."""
-    solve_and_check(*sheet_step(body="ball", terms="membrane+bending+area"))
+    solve_and_check(*sheet_step(body="ball"))
 
 
 def sheet_step(

@@ -1,4 +1,4 @@
-"""Edges, boundary loops, areas and angles of a triangle mesh, and the pixels that it covers."""
+"""Edges, boundary loops, areas and angles of a triangle mesh."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What others' public code reads, read by stubs written from the lines that each README cites."""
+"""Files for others' public code are read by stubs written from the lines that each README cites."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ NAMES_OF_NUMPY_1 = {"numpy.core.multiarray _reconstruct", "numpy ndarray", "nump
 
 @pytest.fixture(scope="module")
 def skinned(home):  # noqa: F811
-    """What skinning answers, and its rows."""
+    """Return the roll-out of skinning, and its rows."""
     method = find_method("skinning")
     return prepared("skinning", home[1]).run().positions, rows_beside(home[1], method)
 
