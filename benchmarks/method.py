@@ -50,6 +50,8 @@ class Training:
             are no more.
         converged: whether it continues, for several times these steps, until the held-out motions get no
             better; the weights that did best on them are kept.
+        packaged: name of the network that is taken from the package in place of this training; empty: it
+            is trained.
     """
 
     kind: str
@@ -58,6 +60,7 @@ class Training:
     steps_of: str = ""
     held_out: int = 0
     converged: bool = False
+    packaged: str = field(default="", metadata={"added": True})
 
 
 class WorkerDied(RuntimeError):

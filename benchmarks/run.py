@@ -55,6 +55,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, report: bool = True) -> int:
     """Run the plan, or print what would be run; return the exit status. report: whether to make one."""
+    print(plan.study.question, file=sys.stderr)
     for motion in plan.inputs.motions.values():
         print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
     if absent := plan.study.motion_files.absent(plan.inputs.motions):

@@ -106,7 +106,7 @@ def score(
     Args:
         roll_out: a file, a folder or a pattern, as the command takes it.
         scene: its name, as "tshirt/kick".
-        study: whose body, garment, motions and sizes the scene has; None: study default.
+        study: whose body, garment, motions and sizes the scene has; None: study full.
         more: `rest_mesh`, `reference` and `folder` of `plan_score`.
 
     Raises:

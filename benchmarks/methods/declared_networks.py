@@ -33,6 +33,10 @@ TRAININGS = {
     "pbns-springs": Training("pbns", PBNS_SPRINGS),
     **{f"snug-{recipe.name}": Training("snug", recipe) for recipe in (*PAPERS, *ABLATIONS)},
 }
+TRAININGS |= {
+    f"{name}-packaged": replace(TRAININGS[name], packaged=name)
+    for name in ("snug", "supervised-vertices", "pbns")
+}
 
 
 def network(
@@ -78,7 +82,7 @@ NAMED = (
             "the SNUG network trained on simulated vertices, strain and collision; augmented clips too"),
     network("supervised-vertices", "Supervised by vertices",
             "the SNUG network trained on simulated vertices of the original motions alone",
-            role="ablation", base="supervised", pairing_group="supervised"),
+            base="supervised", pairing_group="supervised"),
     network("pbns", "", "static pose-space deformation trained on the energies (Bertiche et al. 2021)"),
     network("pbns-springs", "PBNS, springs", "PBNS with its own mass-spring material instead of StVK"),
     network("pbns-paper", "PBNS, paper's text", "PBNS with StVK, trained as SNUG by the paper's text",
@@ -184,4 +188,14 @@ EQUAL_DATA = tuple(
     for mixed in (0, 1, 3, 12)
 )
 
-NETWORKS = (*NAMED, *RECIPES, *POST_PROCESSED, *EQUAL_DATA)
+PACKAGED = tuple(
+    network(
+        f"{entry.name}-packaged", f"{entry.label}, package",
+        f"{entry.name} of the package, trained on all clips by sizes quick: trains nothing, seed 0 alone",
+        base=entry.name, seeded=False,
+    )
+    for entry in NAMED
+    if f"{entry.name}-packaged" in TRAININGS
+)  # fmt: skip
+
+NETWORKS = (*NAMED, *PACKAGED, *RECIPES, *POST_PROCESSED, *EQUAL_DATA)

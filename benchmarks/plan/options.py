@@ -21,8 +21,9 @@ from snug.file_options import split_words
 
 PROGRAM = "benchmarks.run"
 EXAMPLES = """examples:
-  python -m benchmarks.run                                    study default: garments, and a part of others
-  python -m benchmarks.run --trained                          the same without training
+  python -m benchmarks.run                                    study default: all of it, small
+  python -m benchmarks.run full                               more motions, trainings, solvers and scenes
+  python -m benchmarks.run full --trained                     the same with the networks of the package
   python -m benchmarks.run smoke                              everything once, tiny, about 2 minutes
   python -m benchmarks.run full:garments -o reports/runs/mine       one part of a study
   python -m benchmarks.run ./mine.toml --set sizes.frames=60        a study of your own (docs/run.md)
@@ -104,7 +105,7 @@ def add_study_options(parser: argparse.ArgumentParser, short: Sequence[str] = OF
         parser.add_argument(f"--{name}", dest=field, **more)
 
 
-def study_of(options: argparse.Namespace, name: str = "default") -> Study:
+def study_of(options: argparse.Namespace, name: str = "full") -> Study:
     """Return the study of that name with the options of `add_study_options`. Raises ValueError."""
     return read_study(name, [*_tables(options), *map(parse_setting, options.settings)])
 

@@ -62,6 +62,11 @@ class Network:
         """The training; None: an untrained network."""
         return self.users_training or TRAININGS.get(self.name)
 
+    @property
+    def packaged(self) -> str:
+        """Name of the network of the package that it is; empty: it is trained, or of another run."""
+        return self.training.packaged if self.training else ""
+
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:
@@ -207,7 +212,7 @@ def make_plan(
             has been created then.
 
     >>> from benchmarks.plan.study import option, read_study
-    >>> study = read_study("default", [option("scenes", "flag"), option("methods", "simulation")])
+    >>> study = read_study("full", [option("scenes", "flag"), option("methods", "simulation")])
     >>> [scene.name for scene in make_plan(study).scenes]
     ['flag']
     """

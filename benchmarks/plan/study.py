@@ -81,7 +81,7 @@ class Study:
     Attributes:
         question: what it answers, one line.
         parts: name -> scenes that meet methods.
-        sizes: smoke, quick or paper; or a table of changes to one of them, which `base` names.
+        sizes: smoke, small, quick or paper; or a table of changes to one of them, which `base` names.
         scenes: only these: names, patterns, files (mine.py) of scenes; without any all of the parts.
         methods: these in every part, in place of its own: names, patterns, files (mine.py) of methods.
         metrics: files of your own metrics, measured besides all others.
@@ -156,7 +156,7 @@ Table = Mapping[str, Any]
 Record = TypeVar("Record")
 
 
-def read_study(word: str = "default", options: Sequence[Table] = ()) -> Study:
+def read_study(word: str = "full", options: Sequence[Table] = ()) -> Study:
     """Return the study of that name or path, with fields from options in place of its own.
 
     Args:

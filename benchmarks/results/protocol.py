@@ -18,10 +18,10 @@ NUMBER = "2.0"
 DIGESTS = {
     "scenes": "88c6128b67b3dd78",
     "materials": "37f8eb4aecad748b",
-    "motions": "dc71f7b3a0e629a9",
+    "motions": "a3c9146af5c55bb4",
     "metrics": "8d678e8419e78ad3",
     "reference": "143d7369e2970032",
-    "sampling": "01a71f93dd349175",
+    "sampling": "5ede2aabd10fe775",
     "statistics": "bbdacc941ceaa26a",
 }
 DIGEST = digest(DIGESTS)

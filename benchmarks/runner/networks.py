@@ -189,9 +189,11 @@ MAKE = "benchmarks.run -o DIR trains it, --trained DIR takes it"
 def pretrained_network(job: NetworkTraining, folder: Path) -> tuple[Path | None, str]:
     """Return the file of a network in a folder of such files, or of the run that trained it.
 
-    Where there is none, or one of another training, why it cannot be taken.
+    Where there is none, or one of another training (of a packaged one: of another body or garment), why it
+    cannot be taken.
     """
-    name = network_name(job.network.name, job.network.garment, job.network.seed)
+    packaged = job.network.packaged
+    name = network_name(packaged or job.network.name, job.network.garment, job.network.seed)
     places = (folder / f"{name}{SUFFIX}", job.path(RunFolder(folder)))
     path = next((path for path in places if path.is_file()), None)
     if path is None:
@@ -200,7 +202,7 @@ def pretrained_network(job: NetworkTraining, folder: Path) -> tuple[Path | None,
         inputs = read_header(path)["origin"].get("inputs", {})
     except TensorFileError as error:
         return path, str(error)
-    names = inputs.keys() | job.inputs.keys()
+    names = job.inputs.keys() | (inputs.keys() if not packaged else ())
     others = sorted(n for n in names if n != MACHINE and inputs.get(n) != job.inputs.get(n))
     return path, f"{path}: a network of another training ({', '.join(others)}): {MAKE}" if others else ""
 

@@ -17,6 +17,7 @@ from benchmarks.methods import find_method
 from benchmarks.metric import COMPARED_WITH
 from benchmarks.plan.cell import Cell, TaskId, flat, id_of
 from benchmarks.plan.plan import Network, Plan, network_of, runs
+from benchmarks.presets import find_preset
 from benchmarks.provenance import digest, digest_of_file, find_module, software
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cells import files_of, repeat_cell, run_case, run_cell, time_batch
@@ -33,6 +34,7 @@ from benchmarks.runner.networks import LONGEST, NetworkTraining, pretrained_netw
 from benchmarks.runner.task import Outcome, Task
 from benchmarks.scene import Scene
 from benchmarks.scenes import find_scene, of_garment
+from snug.trained import FOLDER
 
 if TYPE_CHECKING:
     from benchmarks.validation.case import Case
@@ -165,13 +167,14 @@ class Schedule:
 
         A network of a user's file is trained all the same, unless its file is there.
         """
-        job = self.training(network)
+        job, folder = self.training(network), self.plan.study.trained
+        folder = FOLDER if network.packaged else folder
         fields: dict[str, Any] = {
             "kind": "network", "name": network.task_id[1], "label": network.label, "silent": True,
             "files": (self.folder.relative(job.path(self.folder)),),
         }  # fmt: skip
-        if self.plan.study.trained is not None and network.training is not None:
-            source, refusal = pretrained_network(job, self.plan.study.trained)
+        if folder is not None and network.training is not None:
+            source, refusal = pretrained_network(job, folder)
             if source or not network.users_training:
                 return Task(
                     stage="pretrained networks", run=partial(take, job, source or Path()), skip=refusal,
@@ -189,11 +192,15 @@ class Schedule:
         kind, steps_of = (chosen.kind, chosen.steps_of) if chosen else (network.name, "")
         steps = self.preset.steps_of(steps_of or network.name, kind)
         steps *= LONGEST if chosen and chosen.converged else 1
-        inputs = self._machine(self.plan.study.device) | self._of_body(network.garment) | {
-            "training": [network.name, chosen], "seed": network.seed, "steps": steps,
-            "motions": {name: self._motion(name) for name in motions},
-            "held out": {name: self._motion(name) for name in held_out},
-        }  # fmt: skip
+        inputs = self._machine(self.plan.study.device) | self._of_body(network.garment)
+        if network.packaged:  # of the package's training clips, which are whole
+            inputs["assets"]["train_frames"] = find_preset("quick").train_frames
+        else:
+            inputs |= {
+                "training": [network.name, chosen], "seed": network.seed, "steps": steps,
+                "motions": {name: self._motion(name) for name in motions},
+                "held out": {name: self._motion(name) for name in held_out},
+            }  # fmt: skip
         digests = {name: digest(value) for name, value in inputs.items()}
         return NetworkTraining(
             network=network, steps=steps, motions=motions, held_out=held_out, device=self.plan.study.device,

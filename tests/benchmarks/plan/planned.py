@@ -15,5 +15,5 @@ def planned(*words: str) -> Plan:
     return make_plan(study_of(options, options.study), folder=Path(options.out) if options.out else None)
 
 
-def study_with(name: str = "default", **fields: Any) -> Study:
+def study_with(name: str = "full", **fields: Any) -> Study:
     return read_study(name, [option(field, value) for field, value in fields.items()])

@@ -21,21 +21,21 @@ TESTS = ("--test-motions", "kick,punch")
 
 
 def test_a_cell_in_two_parts_is_run_once():
-    cells = planned("default:garments,speed", *TESTS).cells
+    cells = planned("full:garments,speed", *TESTS).cells
     keys = [(cell.scene.name, cell.method, cell.seed) for cell in cells]
     assert len(set(keys)) == len(keys)
     # Whole motions and their clips are scenes of their own: a part that times every solver takes the
     # clips.
     assert {cell.suites for cell in cells if cell.scene.part == "clip"} == {("speed",)}
     assert {cell.suites for cell in cells if cell.scene.name == "tshirt/kick"} == {("garments",)}
-    study = study_with("default:garments,speed", scenes="tshirt/kick", methods="simulation")
+    study = study_with("full:garments,speed", scenes="tshirt/kick", methods="simulation")
     both = {name: replace(part, scenes=("tshirt/{motion}",)) for name, part in study.parts.items()}
     (cell,) = make_plan(replace(study, parts=both, test_motions=("kick",))).cells
     assert cell.suites == ("garments", "speed")
 
 
 def test_of_whole_motions_the_first_alone_is_timed_and_all_else_is_measured_in_all():
-    scenes = {cell.scene.name: cell.scene for cell in planned("default:garments,speed", *TESTS).cells}
+    scenes = {cell.scene.name: cell.scene for cell in planned("full:garments,speed", *TESTS).cells}
     assert scenes["tshirt/kick"].timed and not scenes["tshirt/punch"].timed
     assert scenes["tshirt/kick@clip"].timed and scenes["hanging_sheet"].timed
     left_out = {*measured_in(None)} - {*measured_in(scenes["tshirt/punch"].metrics)}
@@ -49,13 +49,13 @@ def test_the_reference_comes_first_in_every_scene_and_only_what_has_a_seed_is_re
         seeds.setdefault(cell.method, set()).add(cell.seed)
         if not cell.scene.networks_only:
             first.setdefault(cell.scene.name, cell.method)
-    assert set(first.values()) == {"simulation"} and len(first) == 8
+    assert set(first.values()) == {"simulation"} and len(first) == 4
     assert seeds["snug"] == seeds["untrained"] == {3, 5}
     assert seeds["simulation"] == seeds["skinning"] == {0}
 
 
 def test_patterns_choose_scenes_methods_and_cases():
-    plan = planned("full:speed,validation,extremes", "--scenes", "*sheet*,free_fall,pend*")
+    plan = planned("paper:speed,validation,extremes", "--scenes", "*sheet*,free_fall,pend*")
     assert {cell.scene.name for cell in plan.cells} == {"hanging_sheet", "sheet_on_sphere", "free_fall"}
     assert [(case.name, case.suite) for case in plan.cases] == [
         ("free_fall", "validation"), ("pendulum", "validation"),
@@ -77,7 +77,7 @@ def test_places_of_a_pattern_are_filled_by_motions_of_the_split():
     [("garments", "skirt/*", "validation"), ("speed", "shorts/*@clip", "test")],
 )
 def test_a_pattern_of_another_garment_means_its_motions_of_the_split(part, pattern, split):
-    plan = planned(f"default:{part}", "--set", f"split={split}", "--scenes", pattern)
+    plan = planned(f"full:{part}", "--set", f"split={split}", "--scenes", pattern)
     measured = plan.motions.measured_of(pattern.partition("/")[0])
     assert {scene.name for scene in plan.scenes} == {pattern.replace("*", motion) for motion in measured}
     assert len(measured) > 1
@@ -89,9 +89,9 @@ def divided(files=(), **fields):
 
 def test_what_no_part_lists_is_met_by_its_whole_name():
     clip, whole = "tunic/twist_stop@clip", "tshirt/twist_stop"
-    met = {(cell.scene.name, cell.suites) for cell in planned("--scenes", f"{clip},{whole}").cells}
+    met = {(cell.scene.name, cell.suites) for cell in planned("full", "--scenes", f"{clip},{whole}").cells}
     assert met == {(clip, ("speed",)), (whole, ("garments",))}
-    assert not {clip, whole} & {scene.name for scene in planned().scenes}
+    assert not {clip, whole} & {scene.name for scene in planned("full").scenes}
 
 
 def test_motions_are_divided_as_help_says():

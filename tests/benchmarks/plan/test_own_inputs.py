@@ -89,5 +89,5 @@ def test_a_file_of_a_body_shape_beside_clips_is_left_out(tmp_path, refused):
 
 def test_own_clips_that_are_cut_are_named_and_more_frames_are_measured_where_they_are_set(tmp_path):
     words = ("--motions", write_motions(tmp_path / "a", "long", frames=200), "--methods", "skinning")
-    assert planned(*words).cut_motions == {"long": "the first 150 of 200 frames"}
-    assert planned(*words, "--set", "sizes.frames=200").cut_motions == {}
+    assert planned("full", *words).cut_motions == {"long": "the first 150 of 200 frames"}
+    assert planned("full", *words, "--set", "sizes.frames=200").cut_motions == {}

@@ -15,7 +15,7 @@ FIELDS = [  # study.toml -> line, field, and what is near it
     ("sedes = [0]", "study.toml: line 1: sedes: no field is called 'sedes'; did you mean seeds"),
     ("seeds = [-1]", "seeds: '-1': give at least one whole number"),
     ("split = 'tset'", "split: 'tset': choose from test, validation"),
-    ("sizes = 'huge'", "sizes: unknown preset 'huge'; choose from smoke, quick, paper"),
+    ("sizes = 'huge'", "sizes: unknown preset 'huge'; choose from smoke, small, quick, paper"),
     ("[sizes]\nbase = 'smoke'\nframe = 3", "study.toml: line 3: sizes.frame: no field is called 'frame'"),
     (
         "[parts.garmnts]",

@@ -121,6 +121,18 @@ def test_a_run_from_files_simulates_and_trains_nothing_but_a_users_own(made, tmp
     assert "data" in {task.kind for task in trained}
 
 
+def test_a_network_of_the_package_stands_beside_the_trained_one_where_it_fits(tmp_path):
+    def networks(**sizes) -> dict[str, tuple[str, str]]:
+        preset = dataclasses.replace(FEW, **sizes)
+        plan = plan_with(tmp_path, "pbns", "pbns-packaged", preset=preset)
+        return {task.label: (task.stage, task.skip) for task in tasks_of(plan) if task.kind == "network"}
+
+    fitting = networks(garment_vertices=1000, train_frames=5)  # however few steps and frames train here
+    assert fitting["pbns seed 0 (tshirt)"] == ("training", "")
+    assert fitting["pbns-packaged seed 0 (tshirt)"] == ("pretrained networks", "")
+    assert "(assets)" in networks()["pbns-packaged seed 0 (tshirt)"][1]
+
+
 def test_every_row_of_a_pretrained_network_says_so(made, tmp_path):
     plan = plan_with(tmp_path, "pbns", "skinning", trained=made[0])
     (taken,) = (task for task in tasks_of(plan) if task.kind == "network")
