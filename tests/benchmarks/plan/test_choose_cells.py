@@ -89,7 +89,9 @@ def divided(files=(), **fields):
 
 def test_what_no_part_lists_is_met_by_its_whole_name():
     clip, whole = "tunic/twist_stop@clip", "tshirt/twist_stop"
-    met = {(cell.scene.name, cell.suites) for cell in planned("full", "--scenes", f"{clip},{whole}").cells}
+    met = {
+        (cell.scene.name, cell.suites) for cell in planned("full", "--scenes", f"{clip},{whole}").cells
+    }
     assert met == {(clip, ("speed",)), (whole, ("garments",))}
     assert not {clip, whole} & {scene.name for scene in planned("full").scenes}
 
