@@ -99,8 +99,6 @@ BLOCKS: tuple[Heading | Figure | TableBlock, ...] = (
     TableBlock("errors_in_spreads"),
     TableBlock("findings", most=40),
     TableBlock("ablation_effects"),
-    Heading("Error against run time"),
-    TableBlock("error_rivals"),
     Heading("Dynamics"),
     TableBlock("dynamics"),
     Figure("energy_series", energy_series),

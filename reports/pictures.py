@@ -1,4 +1,4 @@
-"""Pictures of garments: methods side by side at one frame.
+"""Pictures of garments: methods side by side from one camera, as frames of a film and in the report.
 
 They are drawn on the processor, by a depth buffer: no OpenGL is needed, whose drivers kill the process
 where there is no display, and the same machine gives the same bytes.
@@ -8,18 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
-import pandas as pd
+from scipy.ndimage import uniform_filter1d
 
 from reference_sim.trajectory import Trajectory
-from reports.figures.plotting import DOTS, PAGE_WIDTH, Drawing, file_name, leading, new_figure, wrapped
+from reports.figures.plotting import DOTS, PAGE_WIDTH, Drawing, file_name, new_figure
 from reports.finished_run import Run, shown_seeds
-from reports.tables.table import number
-
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+from reports.statistics.outcomes import leads
+from reports.tables.table import scene_in_words
 
 BODY_COLOUR = (0.80, 0.77, 0.74)
 CLOTH_COLOUR = (0.72, 0.33, 0.22)  # mid-tone: folds show in both directions, in grey too
@@ -51,14 +48,6 @@ def camera_axes(turn: float) -> np.ndarray:
     towards = np.array([np.sin(side) * np.cos(lift), np.sin(lift), np.cos(side) * np.cos(lift)])
     right = np.array([np.cos(side), 0.0, -np.sin(side)])
     return np.stack([right, np.cross(towards, right), towards], axis=1)
-
-
-def camera_for(positions: Sequence[np.ndarray], turn: float, tall: float) -> Camera:
-    """Return a camera that just sees all of these (V,3) [m], in a picture `tall` times as high as wide."""
-    seen = np.concatenate(positions) @ camera_axes(turn)
-    low, high = seen.min(axis=0), seen.max(axis=0)
-    width, height = (high - low)[:2]
-    return Camera(camera_axes(turn) @ ((low + high) / 2.0), 1.06 * float(max(height, width * tall)), turn)
 
 
 @dataclass(frozen=True)
@@ -143,14 +132,18 @@ def _covered(corners: np.ndarray, w: int, h: int) -> tuple[np.ndarray, np.ndarra
 
 
 INERTIA = "energy/inertia"
-MOST_SIDE_BY_SIDE = 6  # methods side by side
-FRONT = -25.0  # turn of the camera [degrees]
-LINE = 0.18  # inches for a line of text
+PAPER, INK = (255, 255, 255), (40, 40, 40)
+PER_ROW = 4
+TALL = 1.25  # height of a view over its width
+SMOOTHED = 0.6  # [s] over which the camera's path is smoothed
+MARGIN = 1.25  # around the garment
+WIDEST = 1.7  # inches of a view in the report
+AZIMUTH = 25.0  # of the camera, from the front to the body's left [degrees]
 
 
 @dataclass(frozen=True)
 class SceneRollOuts:
-    """Roll-outs of one scene: method -> cloth, the body where there is one, and method -> label in a film."""
+    """Roll-outs of one scene: method -> cloth, the body where there is one, and method -> label."""
 
     scene: str
     series: Mapping[str, Trajectory]
@@ -162,84 +155,111 @@ class SceneRollOuts:
         """The roll-out with the most frames; its dt is nan where it has one."""
         return max(self.series.values(), key=lambda cloth: cloth.frames)
 
-    def chosen_frame(self, methods: Sequence[str], reference: str) -> tuple[int, str]:
-        """Choose a frame that these methods have, and say why.
+    def lively_frame(self) -> tuple[int, str]:
+        """Choose a frame that all methods have, and say why.
 
-        It is where the reference's inertia is largest, else the middle. The first fifth is left out, in
-        which a method may still be settling.
+        It is where the first method's inertia is largest, else the middle. The first fifth is left out,
+        in which a method may still be settling.
         """
-        frames = min(self.series[method].frames for method in methods)
-        inertia = self.series[reference].frame_fields.get(INERTIA) if reference in self.series else None
+        frames = min(cloth.frames for cloth in self.series.values())
+        inertia = next(iter(self.series.values())).frame_fields.get(INERTIA)
         if inertia is None:
             return frames // 2, "the middle"
         first = frames // 5
         lively = np.nan_to_num(inertia[first:frames])
-        return first + int(np.argmax(lively)), "where the simulation's inertia term is largest"
+        return first + int(np.argmax(lively)), "where the first one's inertia term is largest"
 
 
-def read_scene(run: Run, rows: pd.DataFrame, methods: Iterable[str]) -> SceneRollOuts:
-    """Read the first good seed of each method, or else its first, in the one scene of these rows."""
-    scene = str(rows["scene"].iloc[0])
-    seeds = shown_seeds(rows).loc[scene]
-    cloths = {method: run.roll_outs.cloth(scene, method, int(seeds[method])) for method in methods}
-    series = {method: cloth for method, cloth in cloths.items() if cloth is not None}
-    return SceneRollOuts(scene, series, run.roll_outs.body(scene) if series else None)
+def camera_path(selected: SceneRollOuts, axes: np.ndarray) -> tuple[np.ndarray, float]:
+    """Return the camera's target in each frame (T,3) [m], smoothed, and half the height that it sees [m]."""
+    cloths = selected.series.values()
+    frames = max(cloth.frames for cloth in cloths)
+    seen = [cloth.positions @ axes for cloth in cloths]
+    low, high = (
+        [np.pad(ends, ((0, frames - len(ends)), (0, 0)), mode="edge") for ends in corners]
+        for corners in ([x.min(axis=1) for x in seen], [x.max(axis=1) for x in seen])
+    )
+    lowest, highest = np.min(low, axis=0), np.max(high, axis=0)
+    dt = selected.longest.dt
+    reach = 0 if np.isnan(dt) else int(SMOOTHED / dt / 2.0)
+    centres = uniform_filter1d((lowest + highest) / 2.0, 2 * reach + 1, axis=0, mode="nearest")
+    right, up, _ = np.maximum(highest - centres, centres - lowest).max(axis=0)
+    return centres @ axes.T, MARGIN * float(max(up, TALL * right))
+
+
+def drawn(mesh: Trajectory, frame: int, colour: tuple[float, float, float], lift: float = 0.0) -> Surface:
+    """Return a roll-out at that frame, past its end at its last, as it is painted."""
+    return Surface(mesh.positions[min(frame, mesh.frames - 1)], mesh.faces, colour, lift)
+
+
+def draw_frames(
+    selected: SceneRollOuts, width: int, azimuth: float, frames: Iterable[int] | None = None
+) -> Iterator[np.ndarray]:
+    """Yield these frames of the film, or all: views of `width` [pixels] with their names, and the time."""
+    width, height = width - width % 2, round(width * TALL / 2) * 2
+    centres, half = camera_path(selected, camera_axes(-azimuth))
+    for frame in range(selected.longest.frames) if frames is None else frames:
+        body = drawn(selected.body, frame, BODY_COLOUR) if selected.body else None
+        cloths = [drawn(cloth, frame, CLOTH_COLOUR, LIFT) for cloth in selected.series.values()]
+        camera = Camera(centres[frame], 2.0 * half, -azimuth)
+        pictures = (255.0 * np.array(views(body, cloths, camera, width, height))).astype(np.uint8)
+        yield _composed(selected, pictures, frame, float(selected.longest.times[frame]))
+
+
+def _composed(selected: SceneRollOuts, pictures: np.ndarray, frame: int, time: float) -> np.ndarray:
+    """Compose pictures (N,H,W,3) in rows, each under its method's name, with the time [s] below them."""
+    from matplotlib import get_data_path
+    from PIL import Image, ImageDraw, ImageFont
+
+    count, height, width, _ = pictures.shape
+    letter = max(12, width // 17)
+    font = ImageFont.truetype(f"{get_data_path()}/fonts/ttf/DejaVuSans.ttf", letter)
+    rows = -(-count // PER_ROW)
+    columns = -(-count // rows)
+    room = 2 * letter
+    image = Image.new("RGB", (columns * width, rows * (height + room) + room), PAPER)
+    draw = ImageDraw.Draw(image)
+    for place, (method, cloth) in enumerate(selected.series.items()):
+        x, y = place % columns * width, place // columns * (height + room)
+        image.paste(Image.fromarray(pictures[place]), (x, y + room))
+        texts = {y + room / 2: selected.labels[method]}
+        if frame >= cloth.frames:
+            texts[y + room + height - letter] = f"ended at {cloth.times[-1]:.2f} s: {cloth.status}"
+        for line, text in texts.items():
+            while draw.textlength(text, font) > 0.96 * width and len(text) > 1:
+                text = text.rstrip("…")[:-1] + "…"
+            draw.text((x + width / 2, line), text, INK, font, anchor="mm")
+    draw.text((image.width / 2, image.height - room / 2), f"{time:.2f} s", INK, font, anchor="mm")
+    return np.asarray(image)
 
 
 def side_by_side(run: Run) -> Iterator[Drawing]:
-    """Draw methods that came to the end of the first whole motion that kept roll-outs, at one frame."""
+    """Draw the methods of page one at one frame of the first whole motion that kept their roll-outs.
+
+    Those that ended early are left out.
+    """
     rows = run.garment_rows[run.garment_rows["metric"] == "energy/total"]
     for scene in [scene for scenes in run.garments(rows).values() for scene in scenes]:
-        of_scene = rows[rows["scene"] == scene]
-        roll_outs = read_scene(run, of_scene, leading(run, of_scene["method"]))
-        if roll_outs.series:
-            most = roll_outs.longest.frames
-            whole = [method for method, cloth in roll_outs.series.items() if cloth.frames == most]
-            yield draw_side_by_side(run, roll_outs, run.ordered(whole)[:MOST_SIDE_BY_SIDE])
+        seeds = shown_seeds(rows[rows["scene"] == scene]).loc[scene]
+        names = leads(run, rows[rows["scene"] == scene])
+        cloths = {name: run.roll_outs.cloth(scene, name, int(seeds[name])) for name in names}
+        most = max((cloth.frames for cloth in cloths.values() if cloth), default=0)
+        whole = {name: cloth for name, cloth in cloths.items() if cloth and cloth.frames == most}
+        if whole:
+            labels = {name: run.label(name) for name in whole}
+            yield _still(SceneRollOuts(scene, whole, run.roll_outs.body(scene), labels))
             return
 
 
-def draw_side_by_side(run: Run, roll_outs: SceneRollOuts, methods: Sequence[str]) -> Drawing:
-    """Draw these methods; the caption names the others."""
-    frame, why = roll_outs.chosen_frame(methods, run.reference)
-    wide = min(PAGE_WIDTH / len(methods), 1.5)
-    tile = (wide, 1.12 * wide)
-    heads = [wrapped(run.label(method), round(15 * wide)) for method in methods]
-    figure = sheet(shots(roll_outs, methods, frame, tile), tile, heads)
-    time = float(roll_outs.series[methods[0]].times[frame])
-    caption = f"{roll_outs.scene}: frame {frame} (t = {number(time)} s), {why}."
-    if others := set(roll_outs.series) - set(methods):
-        names = ", ".join(map(run.label, run.ordered(others)))
-        caption += f" Not shown, for they ended before it or for want of room: {names}."
-    return Drawing(figure, f"frames_{file_name(roll_outs.scene)}", caption, vector=False)
-
-
-def sheet(images: Sequence[np.ndarray], tile: tuple[float, float], heads: Sequence[str]) -> Figure:
-    """Compose pictures in a row, each of `tile` [inches], with texts over them."""
-    wide, high = tile
-    width = wide * len(images)
-    height = LINE * max(text.count("\n") + 1 for text in heads) + high
-    figure = new_figure(width, height)
+def _still(selected: SceneRollOuts) -> Drawing:
+    frame, why = selected.lively_frame()
+    width = PAGE_WIDTH / min(len(selected.series), PER_ROW) * DOTS
+    (image,) = draw_frames(selected, round(min(width, WIDEST * DOTS)), AZIMUTH, [frame])
+    high, wide = image.shape[:2]
+    figure = new_figure(wide / DOTS, high / DOTS)
     figure.set_layout_engine("none")
-    for place, image in enumerate(images):
-        axes = figure.add_axes((place * wide / width, 0.0, wide / width, high / height))
-        axes.imshow(image, interpolation="none")
-        axes.set_axis_off()
-        middle = (place + 0.5) * wide / width
-        figure.text(middle, 1.0 - 0.02 / height, heads[place], ha="center", va="top", fontsize=8.5)
-    return figure
-
-
-def shots(
-    roll_outs: SceneRollOuts, methods: Sequence[str], frame: int, tile: tuple[float, float]
-) -> list[np.ndarray]:
-    """Render each method at that frame from the same place."""
-    cloths = [roll_outs.series[method] for method in methods]
-    surfaces = [Surface(cloth.positions[frame], cloth.faces, CLOTH_COLOUR, LIFT) for cloth in cloths]
-    body = roll_outs.body
-    skin = (
-        Surface(body.positions[frame], body.faces, BODY_COLOUR) if body and frame < body.frames else None
-    )
-    # A torn cloth would make all others small: the camera is the first one's.
-    camera = camera_for([surfaces[0].positions], FRONT, tile[1] / tile[0])
-    return views(skin, surfaces, camera, round(DOTS * tile[0]), round(DOTS * tile[1]))
+    axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    axes.imshow(image, interpolation="none")
+    axes.set_axis_off()
+    caption = f"{scene_in_words(selected.scene)}: frame {frame}, {why}."
+    return Drawing(figure, f"frames_{file_name(selected.scene)}", caption, vector=False)

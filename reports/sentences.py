@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Collection
 from functools import lru_cache
@@ -9,23 +10,19 @@ from functools import lru_cache
 import pandas as pd
 
 from reports.finished_run import Run
-from reports.statistics.means_and_spreads import error_of_twin
-from reports.statistics.outcomes import BAD, EXTERNAL, LEARNED, counted, leads
+from reports.statistics.means_and_spreads import error_of_twin, value_of
+from reports.statistics.outcomes import BAD, EXTERNAL, LEARNED, counted, leads, published_verdicts
 from reports.statistics.paper_claims import counts, in_words, judged
-from reports.statistics.pareto import indistinct
-from reports.statistics.relative_excess import (
-    RELATIVE_EXCESS,
-    Excess,
-    excess_of,
-    with_relative_excess,
-)
-from reports.tables.table import in_scenes, listed, number
+from reports.statistics.pareto import compared_scenes, indistinct, run_time
+from reports.statistics.relative_excess import RELATIVE_EXCESS, excess_of, with_relative_excess
+from reports.statistics.verdicts import compare_methods
+from reports.tables.table import in_scenes, number
 
-CURVATURE, DISTANCE = "curvature/histogram", "distance/rms"
+CURVATURE, DISTANCE, ALIKE = "curvature/histogram", "distance/rms", "dynamics/correlation"
 
 
 def headline(run: Run) -> list[tuple[str, str]]:
-    """Return (topic, its sentences) for each topic of page one that the run can tell, the chief one first."""
+    """Return (topic, its sentences) for each topic of page one that the run can tell, the verdict first."""
     texts = {**_measured(run), "How it ended": endings(run)}
     return [(topic, unbroken(text)) for topic, text in texts.items() if text]
 
@@ -33,26 +30,55 @@ def headline(run: Run) -> list[tuple[str, str]]:
 @lru_cache(maxsize=4)
 def _measured(run: Run) -> dict[str, str]:
     worn = run.garment_rows[run.garment_rows["garment"] == run.first_garment]
-    return {"How near": nearness(run, worn), "How certain": _certainty(run, worn)}
+    return {"Verdict": verdict(run, worn), "How certain": _certainty(run, worn)}
 
 
-def nearness(run: Run, worn: pd.DataFrame) -> str:
-    """Say which relative excess each network of page one has in these rows, and in its worst motion."""
-    names = [n for n in leads(run, worn) if run.methods[n].role in (*LEARNED, EXTERNAL)]
+def verdict(run: Run, worn: pd.DataFrame) -> str:
+    """Say what one method removes of skinning's excess energy, in which time, and how its dynamics are.
+
+    It is the user's own, or else the first network of page one that these rows have.
+    """
+    names = [name for name in leads(run, worn) if run.methods[name].role in (*LEARNED, EXTERNAL)]
     rows = with_relative_excess(run, worn)
     known = {name: excess for name in names if (excess := excess_of(run, rows, name))}
     if not known:
         return ""
+    name = min(known, key=lambda name: run.methods[name].role != EXTERNAL)
+    excess = known[name]
     # Those in which skinning has an excess: a network that failed in one has a remark on it.
     scenes = set(rows[(rows["metric"] == RELATIVE_EXCESS.name) & rows["usable"]]["scene"])
-    shares = [f"{run.label(name)} {_share(excess)}" for name, excess in known.items()]
-    worst = [f"{run.label(name)} {number(of.worst[1], 2)} %{of.fewer}" for name, of in known.items()]
-    return (
-        f"On {len(scenes)} {_kind(run, scenes)}motion{'' if len(scenes) == 1 else 's'} the relative excess "
-        f"is: {listed(shares)}, where the reference has 0 % and skinning alone 100 %. "
-        f"These are geometric means over independent sources of motion; "
-        f"pooled: ratios of sums over motions. Worst motions: {listed(worst)}."
+    removes = excess.typical < 100.0
+    share, pooled = (100.0 - x if removes else x for x in (excess.typical, excess.pooled))
+    text = (
+        f"In {'a typical' if len(scenes) > 1 else 'one'} {_kind(run, scenes)}motion {run.label(name)} "
+        f"{'removes' if removes else 'has'} {number(share, 2)} % of the energy that skinning has in excess "
+        "of a converged simulation"
     )
+    text += f" ({number(pooled, 2)} % pooled over all motions)" if len(scenes) > 1 else ""
+    if times := _times_faster(run, name):
+        text += f", more than {times} times faster than that simulation"
+    if (alike := value_of(worn, name, ALIKE)) is not None:
+        text += f"; the dynamics of its hem {likeness(alike)} the simulation's"
+    return f"{text}{excess.fewer}."
+
+
+def _times_faster(run: Run, name: str) -> int:
+    """Return to one digit how many times as long the reference takes at least; 0 where that is not known."""
+    cells = run.cells("speed", "garments")
+    scenes = compared_scenes(run, cells)
+    timed = cells[cells["scene"].isin(scenes)] if scenes else run.garment_rows
+    metric = run.metrics.get(run_time(timed))
+    faster = compare_methods(run, timed, metric, run.reference, name).effect if metric else None
+    least = min(faster.interval or (faster.shown,)) if faster else 0.0
+    power = 10 ** math.floor(math.log10(least)) if least > 1.0 else 1
+    return power * math.floor(least / power)  # one digit: the simulation's time is uncertain by half
+
+
+def likeness(correlation: float) -> str:
+    """Return in words how dynamics follow others with which they have that correlation."""
+    if correlation < 0.3:
+        return "hardly follow"
+    return "partly follow" if correlation < 0.8 else "follow"
 
 
 def _kind(run: Run, scenes: Collection[str]) -> str:
@@ -62,20 +88,17 @@ def _kind(run: Run, scenes: Collection[str]) -> str:
     return "validation " if set(scenes) <= set(run.with_motion("validation")) else "unseen "
 
 
-def _share(excess: Excess) -> str:
-    """Return a relative excess as "6.1 % (95 % interval 2.3 to 14; pooled 12 %)", and of which roll-outs."""
-    remarks = [f"pooled {number(excess.pooled, 2)} %"]
-    if ends := excess.effect.interval:
-        remarks.insert(0, f"95 % interval {' to '.join(number(end, 2) for end in ends)}")
-    return f"{number(excess.typical, 2)} % ({'; '.join(remarks)}){excess.fewer}"
-
-
 def _certainty(run: Run, worn: pd.DataFrame) -> str:
-    """Say which primary claims hold, and how far equally valid simulations lie from the reference."""
+    """Say which primary claims hold, and how far equally valid simulations lie from the reference.
+
+    One seed decides next to nothing: the published verdicts stand beside those of such a run.
+    """
     sentences = []
     if counted_claims := counts(judged(run)):
         tests = f"{counted_claims.total()} test{'' if counted_claims.total() == 1 else 's'}"
-        sentences.append(f"Of {tests} of primary claims of the paper {in_words(counted_claims)}.")
+        published = published_verdicts() if run.one_seed else ""
+        beside = f" with one seed; in the published run {published}" if published else ""
+        sentences.append(f"Of {tests} of primary claims of the paper {in_words(counted_claims)}{beside}.")
     distance, curvature = (indistinct(run, worn, metric) for metric in (DISTANCE, CURVATURE))
     if distance and curvature:
         sentences.append(

@@ -68,9 +68,6 @@ KNOWN = {
     "simulation-tolerance": Style("Simulation to a tolerance", "#555555", "*"),
     "simulation-dt": Style("Simulation with smaller steps", "#882255", "*"),
 }
-# Roles that a figure shows when it has no room for all; external: roll-outs of the user.
-LEADING = ("reference", "baseline", "network", "external")
-ROOM = 8  # methods that a figure shows whatever they are
 # Members of a family share its colour. Iterations go by doubling: four in a row have four lines.
 _DASHES: tuple[Line, ...] = ((0.0, (8.0, 1.5)), "--", "-.", ":")
 _SPARE = ("#999933", "#661100", "#AA4499", "#117733", "#88CCEE", "#DDCC77")
@@ -106,15 +103,6 @@ def style(run: Run, method: str) -> Style:
     if declared.level is None or declared.level < 1.0:
         return plain
     return replace(plain, line=_DASHES[int(declared.level).bit_length() % len(_DASHES)])
-
-
-def leading(run: Run, methods: Iterable[str]) -> list[str]:
-    """Return the methods in order; those of leading roles alone where a figure has no room for all.
-
-    Perturbed references, which only show the reference's uncertainty, are left out.
-    """
-    ordered = run.ordered(set(methods) - run.twins)
-    return ordered if len(ordered) <= ROOM else [m for m in ordered if run.methods[m].role in LEADING]
 
 
 PAGE_WIDTH = 6.7  # inches of text width on the report's page
@@ -210,7 +198,7 @@ def power_text(value: float) -> str:
     return f"{mantissa}e{int(power)}"
 
 
-def wrapped(name: str, width: int = 44) -> str:
+def wrapped(name: str, width: int) -> str:
     """Break a long name into lines, after a separator where there is one."""
     lines = [""]
     for piece in re.findall(rf"[^_/ :-]{{1,{max(width - 1, 1)}}}[_/ :-]?|[_/ :-]", name):

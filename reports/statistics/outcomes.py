@@ -13,6 +13,7 @@ import pandas as pd
 
 from benchmarks.results.run_folder import RunFolder
 from reports.finished_run import Run, read_run
+from reports.statistics.paper_claims import in_words
 from reports.statistics.pareto import NETWORK
 
 BAD = ("failed", "diverged", "timeout", "out-of-memory", "stalled")  # statuses, the worst first
@@ -92,3 +93,12 @@ DEFAULT = "quick"  # the preset that is published, and the folder of its run
 def read_published(folder: Path) -> Run:
     """Return a published run, read once. Raises ResultsError for a run of an earlier version."""
     return read_run(RunFolder(folder))
+
+
+def published_verdicts() -> str:
+    """Return how the published run decides the primary claims, in words; empty where it is not installed."""
+    path = PUBLISHED / DEFAULT / "tables" / "findings.csv"
+    if not path.is_file():
+        return ""
+    table = pd.read_csv(path)
+    return in_words(Counter(table[table["family"] == "primary"]["verdict"].str.partition(":")[0]))

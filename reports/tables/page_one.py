@@ -11,17 +11,13 @@ from reports.statistics.effects import Effect
 from reports.statistics.means_and_spreads import mean_of, value_of
 from reports.statistics.outcomes import EXTERNAL, leads
 from reports.statistics.pareto import (
-    ACCURACIES,
     NETWORK,
     SMALLER_STEPS,
     compared_scenes,
-    fastest,
     indistinct,
-    points_of,
     reference_scenes,
     rivals,
     run_time,
-    truncated,
 )
 from reports.statistics.relative_excess import excess_of, own_excess_of, with_relative_excess
 from reports.statistics.verdicts import compare_methods
@@ -111,33 +107,6 @@ def _times_faster(run: Run, timed: pd.DataFrame, method: str) -> Effect | None:
 
 UNCERTAIN = ("curvature/histogram", "curvature/error", "distance/rms")
 OF_STEPS = ("energy/strain", "dynamics/correlation", "dynamics/amplitude")  # which it changes
-
-
-def error_rivals(run: Run) -> list[Table]:
-    """Tabulate, for each error, the fastest solver as accurate as SNUG."""
-    frame = run.cells("speed", "garments")
-    scenes = compared_scenes(run, frame)
-    lines: list[tuple[Cell, ...]] = []
-    for metric in ACCURACIES:
-        points = points_of(run, frame, scenes, metric) if metric in run.metrics else []
-        network = next((p for p in points if p.method == NETWORK), None)
-        if network is None:
-            continue
-        solver = fastest(truncated(run, points), network.error)
-        as_accurate = (solver.method, solver.time) if solver else ("", None)
-        lines.append((run.metrics[metric].heading, network.error, network.time, *as_accurate))
-    columns = (
-        Column("error", "Error", text=True),
-        Column("network", "Of SNUG"),
-        Column("network_time", "Run time of SNUG", "ms"),
-        Column("as_accurate", "Fastest solver as accurate", text=True, method=True),
-        Column("as_accurate_time", "Its run time", "ms"),
-    )
-    caption = (
-        f"SNUG in {', '.join(scenes)}, and the fastest solver stopped early, without a network, that is as "
-        "accurate. A dash: none."
-    )
-    return table("error_rivals", columns, lines, caption)
 
 
 def reference_uncertainty(run: Run) -> list[Table]:

@@ -16,6 +16,7 @@ from reference_sim.files.atomic_files import replacing
 from reports.finished_run import Run
 from reports.statistics.effects import DIFFERENCE, RANGE, RATIO, Effect
 from reports.statistics.means_and_spreads import Mean
+from snug.motion.library import CLIPS, clip_of
 
 DASH = "–"
 CSV_DASH = "-"
@@ -85,6 +86,19 @@ def in_scenes(scenes: Collection[str]) -> str:
     """Return "in 1 scene", "in 2 scenes" or, of liveliest parts alone, "in 2 clips"."""
     kind = "clip" if all(name.endswith("@clip") for name in scenes) else "scene"
     return f"in {len(scenes)} {kind}{'' if len(scenes) == 1 else 's'}"
+
+
+def scene_in_words(scene: str) -> str:
+    """Return a scene by its garment, what a recorded motion shows, and the motion.
+
+    >>> scene_in_words("tshirt/07_02@clip"), scene_in_words("push_recovery")
+    ('tshirt: walk, 1.5 m/s, 07_02, clip', 'push recovery')
+    """
+    garment, _, motion = scene.rpartition("/")
+    name, _, part = motion.partition("@")
+    clip = CLIPS.get(clip_of(name))
+    words = (clip.content, name) if clip else (name.replace("_", " "),)
+    return f"{garment}: " * bool(garment) + ", ".join(filter(None, (*words, part)))
 
 
 def listed(items: Sequence[str]) -> str:

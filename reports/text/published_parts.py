@@ -23,7 +23,6 @@ names.
 
 from __future__ import annotations
 
-import math
 import re
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -37,13 +36,14 @@ from benchmarks.plan.study import PACKAGED, read_study
 from benchmarks.presets import PRESETS
 from benchmarks.results.run_folder import RunFolder
 from reports.finished_run import Run
+from reports.sentences import verdict
 from reports.statistics.effects import RATIO
 from reports.statistics.means_and_spreads import mean_of
 from reports.statistics.outcomes import PUBLISHED, read_published
 from reports.statistics.paper_claims import EXPLORATORY, PRIMARY, Claim, Judged, in_words, judged
-from reports.statistics.pareto import NETWORK, compared_scenes, fastest, points_of, run_time, truncated
+from reports.statistics.pareto import NETWORK, compared_scenes, fastest, points_of, truncated
 from reports.statistics.relative_excess import excess_of, with_relative_excess
-from reports.statistics.verdicts import compare_methods, measure_of
+from reports.statistics.verdicts import measure_of
 from reports.tables import TABLES
 from reports.tables.page_one import overview
 from reports.tables.paper_tables import paper_tables
@@ -164,25 +164,16 @@ def front_sentences(run: Run) -> str:
     rows = with_relative_excess(run, worn)
     snug, pbns, supervised = (excess_of(run, rows, name) for name in (NETWORK, "pbns", "supervised"))
     swing, alike = (mean_of(worn, NETWORK, name) for name in (SWING, ALIKE))
-    scenes = compared_scenes(run, cells)
-    timed = cells[cells["scene"].isin(scenes)]
-    points = points_of(run, cells, scenes, "gap/energy")
+    points = points_of(run, cells, compared_scenes(run, cells), "gap/energy")
     network = next((point for point in points if point.method == NETWORK), None)
     solver = fastest(truncated(run, points), network.error) if network else None
-    faster = compare_methods(run, timed, run.metrics[run_time(timed)], run.reference, NETWORK).effect
-    if not (snug and pbns and supervised and swing and alike and network and solver and faster):
+    if not (snug and pbns and supervised and swing and alike and network and solver):
         raise ValueError(
             "the run lacks SNUG, PBNS, the supervised network, or their times beside solvers"
         )
     worst, most = snug.worst
-    least = min(faster.interval or (faster.shown,))
-    power = 10 ** math.floor(math.log10(least))
-    times = power * math.floor(least / power)  # one digit: the simulation's time is uncertain by half
     return "\n".join([
-        f"**In a typical unseen motion SNUG removes {number(100.0 - snug.typical, 2)} % of the energy that "
-        f"skinning has in excess of a converged simulation ({number(100.0 - snug.pooled, 2)} % pooled over "
-        f"all motions), more than {times} times faster than that simulation; the dynamics of its hem "
-        f"{likeness(alike.value)} the simulation's.**",
+        f"**{verdict(run, worn)}**",
         "",
         f"- Good at: energy for its time. PBNS leaves {number(pbns.typical, 2)} % of that excess, the "
         f"supervised network {number(supervised.typical, 2)} %; solvers as accurate take at least "
@@ -192,13 +183,6 @@ def front_sentences(run: Run) -> str:
         f"amplitude; the worst motion, "
         f"{worst.partition('/')[2]}, keeps {number(most, 2)} %.",
     ])  # fmt: skip
-
-
-def likeness(correlation: float) -> str:
-    """Return in words how dynamics follow others with which they have that correlation."""
-    if correlation < 0.3:
-        return "hardly follow"
-    return "partly follow" if correlation < 0.8 else "follow"
 
 
 def run_rows(folders: Sequence[Path]) -> Rows:

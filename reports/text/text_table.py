@@ -78,6 +78,6 @@ def answer(run: Run, tables: Mapping[str, Table]) -> str:
         rows = text_rows(run, table, [name for name in COLUMNS if name in names][:MOST_COLUMNS])
         lines.append(markdown_table(rows))
         notes = [remarks_on(rows)]
-    chief = [text for topic, text in headline(run) if topic == "How near"]
+    chief = [text for topic, text in headline(run) if topic == "Verdict"]
     lines.append(" ".join(filter(None, [*chief, *notes])))
     return "\n".join(filter(None, lines)).replace("\u00a0", " ")

@@ -20,15 +20,6 @@ def test_methods_keep_their_order_and_their_look():
     assert plotting.style(run, "newton-2").line != plotting.style(run, "newton-8").line
 
 
-def test_what_starts_from_a_method_has_its_colour_and_an_ablation_its_marker():
-    run = run_of([row(method=m) for m in ("snug", "snug+lbfgs-4", "snug-no-inertia", "snug+cleanup")])
-    base, less, warm, cleaned = (
-        plotting.style(run, m) for m in ("snug", "snug-no-inertia", "snug+lbfgs-4", "snug+cleanup")
-    )
-    assert warm.colour == cleaned.colour == base.colour != less.colour
-    assert less.marker == base.marker and warm.marker != base.marker
-
-
 def test_the_first_seed_that_came_to_its_end_is_shown():
     bad = [row(value=None, status="diverged", reason="no end", method=m) for m in ("snug", "pbns")]
     rows = [*bad, row(seed=2), row(seed=1), row(method="skinning")]
