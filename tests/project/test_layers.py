@@ -31,6 +31,7 @@ ALLOWED = {
         "reference_sim.geometry.surface",
         "reference_sim.geometry.topology",
         "reference_sim.obstacle",
+        "snug.motion.library",  # what recorded motions show, in words
     ),
 }
 # The referee's solvers are not for the contestants.
