@@ -46,10 +46,6 @@ class Training:
         recipe: options of network and training.
         simulated: simulations that it learns from; None if it learns from the energies alone.
         steps_of: name of the training whose number of steps it takes; empty for its own number.
-        held_out: number of training motions, counted from the last, that are not trained on, unless there
-            are no more.
-        converged: whether it continues, for several times these steps, until the held-out motions get no
-            better; the weights that did best on them are kept.
         packaged: name of the network that is taken from the package in place of this training; empty: it
             is trained.
     """
@@ -58,8 +54,6 @@ class Training:
     recipe: Recipe
     simulated: Simulated | None = None
     steps_of: str = ""
-    held_out: int = 0
-    converged: bool = False
     packaged: str = field(default="", metadata={"added": True})
 
 

@@ -157,9 +157,9 @@ RECIPES = tuple(
 def _equal_data(name: str, label: str, trained: str, mixed: int) -> MethodEntry:
     """Declare a network trained as `trained`, on equal data: `mixed` augmented frames for each given one.
 
-    The last training motion is held out. With every seed a network that simulated vertices teach gets the
-    same clips, simulated once; another mixes as many anew. Both have SNUG's number of steps. Not timed:
-    its run time is that of the network of the usual data.
+    With every seed a network that simulated vertices teach gets the same clips, simulated once; another
+    mixes as many anew. Both have SNUG's number of steps. Not timed: its run time is that of the network
+    of the usual data.
     """
     usual = TRAININGS[trained]
     recipe = replace(usual.recipe, name=f"{usual.recipe.name}-data-{mixed}")
@@ -171,7 +171,7 @@ def _equal_data(name: str, label: str, trained: str, mixed: int) -> MethodEntry:
     return network(
         f"{name}-data-{mixed}", f"{label}, {mixed} augmented for each",
         f"{name} that learns from original data and {mixed} augmented frames for each",
-        training=replace(training, steps_of="snug", held_out=1),
+        training=replace(training, steps_of="snug"),
         role="ablation", batched=False, timed=False,
         reporting=Reporting(
             family=f"{name}-data", level=float(mixed), base=trained, pairing_group=name,

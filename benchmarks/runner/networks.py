@@ -27,8 +27,6 @@ if TYPE_CHECKING:
     from snug.motion.motion import Motion
     from snug.networks.trained_model import TrainedModel
 
-LONGEST = 4  # times the steps of others: at most as many has a training that is to converge
-VALIDATIONS = 25  # in the steps of others: after so many that were no better it has converged
 EVERY = 20  # training steps between two rows of a model's history
 # Of a training's summary: what its guard against divergence has done, and its epochs.
 INCIDENTS = ("high_windows", "skipped_updates", "restored", "epochs")
@@ -43,7 +41,6 @@ class NetworkTraining:
         network: its name, seed, garment and declared training.
         steps: of the training.
         motions: what it learns from.
-        held_out: motions that stop it, where it goes on until it has converged.
         reads: tasks that simulate motions and mixed clips, where it learns from simulations.
         device: cpu or cuda, for every part of a step.
         inputs: name -> digest of each input.
@@ -54,7 +51,6 @@ class NetworkTraining:
     network: Network
     steps: int
     motions: tuple[str, ...]
-    held_out: tuple[str, ...] = ()
     reads: tuple[TaskId, ...] = ()
     device: str
     inputs: Mapping[str, str]
@@ -79,7 +75,6 @@ def train(job: NetworkTraining, context: Context, needed: Needed) -> Outcome:
     from snug.networks.dressed_body import DressedBody
     from snug.training.checkpoint import Checkpoint
     from snug.training.train_network import train_network, untrained_model
-    from snug.training.validation import Validation
 
     torch.set_num_threads(1)
     network, training = job.network, job.network.training
@@ -97,11 +92,6 @@ def train(job: NetworkTraining, context: Context, needed: Needed) -> Outcome:
         targets = {m: Trajectory.load(run.path / o.files[0]).positions for m, o in whole.items()}
         mixed, simulated = mixed_clips(job, assets, run, needed)
         targets |= simulated
-    validation = None
-    if job.held_out:
-        every = max(1, job.steps // (LONGEST * VALIDATIONS))
-        held_out = assets.named(job.held_out)
-        validation = Validation(motions=held_out, every=every, patience=VALIDATIONS, trajectories=targets)
     checkpoint = Checkpoint(
         path=path.with_name(f".{path.stem}.checkpoint.safetensors"), minutes=CHECKPOINT_MINUTES,
         resume=True, key=digest([job.key, targets]),
@@ -112,7 +102,7 @@ def train(job: NetworkTraining, context: Context, needed: Needed) -> Outcome:
         model = train_network(
             training.kind, dressed, [*assets.named(motions), *mixed], steps=job.steps,
             seed=job.network.seed, trajectories=targets, recipe=training.recipe, progress=False,
-            every=EVERY, device=job.device, checkpoint=checkpoint, validation=validation,
+            every=EVERY, device=job.device, checkpoint=checkpoint,
         )  # fmt: skip
     model.origin = origin_of(job, needed, left_out=[name for name in job.motions if name not in motions])
     outcome = _outcome(model, job, run, {})
@@ -135,7 +125,6 @@ def _outcome(model: TrainedModel, job: NetworkTraining, run: RunFolder, facts: d
         "megabytes": model.megabytes,
         "steps": model.steps,
         **{name: model.summary[name] for name in INCIDENTS if name in model.summary},
-        "validation": model.summary.get("validation", {}),
         "last": dict(model.history[-1]) if model.history else {},
     }
     origin = {"hardware": provenance.hardware_line(model.origin["hardware"])}
@@ -150,7 +139,6 @@ def origin_of(job: NetworkTraining, needed: Needed, *, left_out: list[str]) -> d
         "network": job.network.name,
         "garment": job.network.garment,
         "motions": [name for name in job.motions if name not in left_out],
-        "held_out": list(job.held_out),
         "simulated_by": simulated.method if simulated else "",
         "left_out": left_out,
         "clips_left_out": sum(len(outcome.result.get("left_out", ())) for outcome in needed.values()),

@@ -30,7 +30,7 @@ from benchmarks.runner.ground_truth import (
     simulate_quasi_static,
 )
 from benchmarks.runner.measurements import measure_cell
-from benchmarks.runner.networks import LONGEST, NetworkTraining, pretrained_network, take, train
+from benchmarks.runner.networks import NetworkTraining, pretrained_network, take, train
 from benchmarks.runner.task import Outcome, Task
 from benchmarks.scene import Scene
 from benchmarks.scenes import find_scene, of_garment
@@ -133,8 +133,8 @@ class Schedule:
         if simulated is None:
             return []
         entry, garment = find_method(simulated.method), network.garment
-        motions, held_out = self._learned(network)
-        given = [self.data(motion, garment, entry) for motion in (*motions, *held_out)]
+        motions = self.plan.motions.train
+        given = [self.data(motion, garment, entry) for motion in motions]
         clips = (self.clips(garment, simulated, motions, part) for part in range(simulated.mixed))
         return [*given, *clips]
 
@@ -187,11 +187,10 @@ class Schedule:
         )  # fmt: skip
 
     def training(self, network: Network) -> NetworkTraining:
-        """Return how a network is trained; one that is to converge has the most steps."""
-        (motions, held_out), chosen = self._learned(network), network.training
+        """Return how a network is trained."""
+        motions, chosen = self.plan.motions.train, network.training
         kind, steps_of = (chosen.kind, chosen.steps_of) if chosen else (network.name, "")
         steps = self.preset.steps_of(steps_of or network.name, kind)
-        steps *= LONGEST if chosen and chosen.converged else 1
         inputs = self._machine(self.plan.study.device) | self._of_body(network.garment)
         if network.packaged:  # of the package's training clips, which are whole
             inputs["assets"]["train_frames"] = find_preset("quick").train_frames
@@ -199,11 +198,10 @@ class Schedule:
             inputs |= {
                 "training": [network.name, chosen], "seed": network.seed, "steps": steps,
                 "motions": {name: self._motion(name) for name in motions},
-                "held out": {name: self._motion(name) for name in held_out},
             }  # fmt: skip
         digests = {name: digest(value) for name, value in inputs.items()}
         return NetworkTraining(
-            network=network, steps=steps, motions=motions, held_out=held_out, device=self.plan.study.device,
+            network=network, steps=steps, motions=motions, device=self.plan.study.device,
             reads=tuple(task.id for task in self.ground_truth(network)), inputs=digests,
             key=digest(digests | software(*RUNNING, *users_code(network.declared_in))),
         )  # fmt: skip
@@ -344,13 +342,6 @@ class Schedule:
         """
         files = self.plan.inputs.motions
         return f"{name} {digest(files[name])}" if name in files else name
-
-    def _learned(self, network: Network) -> tuple[tuple[str, ...], tuple[str, ...]]:
-        """Return the motions that a network trains on, and those that stop its training."""
-        motions, training = self.plan.motions.train, network.training
-        count = training.held_out if training and training.held_out < len(motions) else 0
-        last = len(motions) - count
-        return motions[:last], motions[last:] if training and training.converged else ()
 
     def _settled_in(self, scene: Scene) -> Scene:
         """Return the scene whose settled garment another one starts from."""

@@ -48,7 +48,7 @@ TURN_SHARES = {
     "head": 1.0,
 }  # fmt: skip
 TURN_HERTZ = (0.2, 1.0)  # Hz, of the slow turns and lifts
-TURN = 0.1  # rad, standard deviation of the added turns
+TURN = 0.2  # rad, standard deviation of the added turns
 LIFTED = 0.25  # share of the thighs that are lifted
 CLIP_FRAMES = 60  # of a mixed clip
 MAX_AUGMENTED_FRAMES = 20_000  # frames: each keeps its body and its anchors

@@ -17,7 +17,7 @@ from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Network
 from benchmarks.runner import ground_truth, training_motions
 from benchmarks.runner.ground_truth import simulate_clips
-from benchmarks.runner.networks import LONGEST, train
+from benchmarks.runner.networks import train
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.runner.task import Outcome
 from reference_sim import Trajectory
@@ -154,27 +154,8 @@ def test_a_training_of_equal_data_has_the_steps_and_clips_that_it_declares(tmp_p
         task, training = tasks[entry.trained], entry.training
         mixed = training.simulated.mixed if training.simulated else 0
         assert sum(kind == "clips" for kind, _ in task.reads) == mixed
-        assert task.motions == ("walk", "run")
-        assert task.steps == plan.study.sizes.steps["snug"] * (LONGEST if training.converged else 1)
-        assert task.held_out == (("bow",) if training.converged else ())
-
-
-def test_a_training_goes_on_until_held_out_motions_get_no_better(tmp_path, monkeypatch):
-    entry = find_method("supervised-data-0")
-    motions = {name: dataclasses.replace(MOTION, name=name) for name in ("given", "held")}
-    assets = dataclasses.replace(assets_of(tube_dress(), MOTION), motions=motions)
-    needed = {("data", name): whole(tmp_path, name) for name in motions}
-    task = dataclasses.replace(
-        training("supervised", "given", steps=200), held_out=("held",),
-        network=Network(entry.trained, 0, "tshirt", dataclasses.replace(entry.training, converged=True)),
-        reads=tuple(needed),
-    )  # fmt: skip
-    values = iter([5.0, 3.0, *[4.0] * 200])
-    monkeypatch.setattr("snug.training.validation.Validator.value", lambda self: next(values))
-    result = train(task, context(tmp_path, assets), needed).result
-    # Of 200 steps: a validation after each second, no better than the second one 25 times.
-    assert result["steps"] == 2 * (2 + 25) and result["validation"]["best_step"] == 4
-    assert result["validation"]["motions"] == ["held"] and result["frames"] == 90
+        assert task.motions == ("walk", "run", "bow")
+        assert task.steps == plan.study.sizes.steps["snug"]
 
 
 @pytest.mark.slow
