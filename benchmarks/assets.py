@@ -109,15 +109,13 @@ def _read_motions(files: Sequence[str], options: MotionFileOptions | None) -> di
 class Assets:
     """A body, its garments and the motions, all by name; each as long as the preset lets it be.
 
-    clips: motion -> frames of its liveliest part. bodies: motion or clip -> posed body (T,B,3) [m], where
-    ready made.
+    clips: motion -> frames of its liveliest part.
     """
 
     body: Body
     garments: dict[str, Garment]
     motions: dict[str, Motion]
     clips: dict[str, range]
-    bodies: dict[str, np.ndarray] = field(default_factory=dict)
 
     def named(self, names: Iterable[str]) -> list[Motion]:
         """Return the motions of those names, in that order."""
@@ -140,12 +138,7 @@ class Assets:
         """Return the assets with this motion alone: little to hand to another process."""
         names = {motion} & self.motions.keys()
         motions = {name: self.motions[name] for name in names}
-        return replace(self, motions=motions, clips={name: self.clips[name] for name in names}, bodies={})
-
-    def posed_body(self, motion: Motion, betas: np.ndarray | None = None) -> np.ndarray:
-        """Return the body (T,B,3) [m] of that shape, or of the mean one, in that motion."""
-        ready = self.bodies.get(motion.name)
-        return self.body.vertices(motion.poses, motion.translations, betas) if ready is None else ready
+        return replace(self, motions=motions, clips={name: self.clips[name] for name in names})
 
 
 def open_assets(

@@ -76,10 +76,6 @@ class RunFolder:
         """Return the path of the settled start (V,3) [m] of a dressed scene."""
         return self.trajectory_path(scene, "settled").with_suffix(".npy")
 
-    def body_path(self, scene: str) -> Path:
-        """Return the path of the posed body (T,B,3) [m] of a dressed scene: who reads it needs no torch."""
-        return self.trajectory_path(scene, "body").with_suffix(".npy")
-
     def remove_parts(self) -> None:
         """Remove what a run that was killed was just writing: the folder is one run's at a time."""
         for path in [*self.path.rglob(".*.part*"), *self.path.rglob("*.vtkhdf.part")]:

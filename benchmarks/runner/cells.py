@@ -146,18 +146,16 @@ def repeat_cell(longest: float, cell: Cell, least: float, context: Context, need
 
 
 def build_scene(scene: Scene, context: Context) -> BuiltScene:
-    """Return the scene, built once for a batch; a dressed one with start and body of the run's folder."""
+    """Return the scene, built once for a batch; a dressed one with the start of the run's folder."""
     run, assets = context.folder, context.assets
     if "scene" in context.memo:
         return context.memo["scene"]
-    if assets and run.body_path(scene.name).is_file():
+    built = scene.build(assets)
+    if assets and run.start_path(scene.name).is_file():
         import numpy as np
 
-        bodies = {assets.motion(scene.motion, scene.part).name: np.load(run.body_path(scene.name))}
         start = np.load(run.start_path(scene.name))
-        built = replace(scene.build(replace(assets, bodies=bodies)), settle=lambda: start)
-    else:
-        built = scene.build(assets)
+        built = replace(built, settle=lambda: start)
     context.memo["scene"] = built
     return built
 

@@ -31,8 +31,6 @@ def settle_start(scene: Scene, context: Context, needed: Needed) -> Outcome:
 
     built, run, shared = scene.build(context.assets), context.folder, scene.start_of
     assert built.obstacle is not None
-    with replacing(run.body_path(scene.name)) as temporary:
-        write_array(temporary, built.obstacle.positions)
     Trajectory(
         positions=built.obstacle.positions.astype(np.float32),  # for the eye: half the size
         faces=built.obstacle.faces,
@@ -46,8 +44,7 @@ def settle_start(scene: Scene, context: Context, needed: Needed) -> Outcome:
 
 def files_of_start(scene: Scene, run: RunFolder) -> tuple[str, ...]:
     """Return the names of the files that `settle_start` writes."""
-    name = scene.name
-    paths = run.start_path(name), run.body_path(name), run.trajectory_path(name, "body")
+    paths = run.start_path(scene.name), run.trajectory_path(scene.name, "body")
     return tuple(map(run.relative, paths))
 
 
@@ -118,7 +115,7 @@ def simulated_clip(
 
     assets = context.assets
     assert assets is not None
-    alone = replace(assets, motions={clip.name: clip}, clips={}, bodies={})
+    alone = replace(assets, motions={clip.name: clip}, clips={})
     built = replace(scene, name=f"{scene.garment}/{clip.name}", motion=clip.name).build(alone)
     try:
         trajectory = simulated(built, entry, context.folder)

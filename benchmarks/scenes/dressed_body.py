@@ -68,21 +68,22 @@ def build_dressed_body(
     terms = minimised or energies
     warm_up = max(2, min(warm_up_frames, int(SHORT * motion.frames)))
     return worn(
-        scene, assets, dressed, cloth=cloth, energies=energies, settle=settle, minimised=minimised,
+        scene, dressed, cloth=cloth, energies=energies, settle=settle, minimised=minimised,
         warm_up=warm_up,
     )  # fmt: skip
 
 
-def worn(scene: Scene, assets: Assets, dressed: Dressed, **further: Any) -> BuiltScene:
+def worn(scene: Scene, dressed: Dressed, **further: Any) -> BuiltScene:
     """Return the scene of a garment on a moving body, with further fields of BuiltScene."""
     body, garment, motion, shape = dressed.body, dressed.garment, dressed.motion, dressed.betas
+    posed = body.vertices(motion.poses, motion.translations, shape)
     handles = garment.pin_positions(body, motion.poses, motion.translations, shape)
     return BuiltScene(
         name=scene.name,
         dt=1.0 / motion.fps,
         frames=motion.frames,
         # Which faces a vertex may touch is a matter of the body that the garment was made for.
-        obstacle=Obstacle(assets.posed_body(motion, shape), body.faces, rest_positions=body.shaped()),
+        obstacle=Obstacle(posed, body.faces, rest_positions=body.shaped()),
         origin_heights=dressed.pelvis[:, 1],
         dressed=dressed,
         pin_positions=handles.__getitem__ if len(garment.pins) else None,

@@ -65,7 +65,7 @@ def build_hard_motion(
 
     glitch = GLITCH if change in ("root_jumps", "limb_flips") else None
     dressed = Dressed(body, garment, motion, shape)
-    return worn(scene, assets, dressed, cloth=cloth, energies=energies, settle=settle, glitch=glitch)
+    return worn(scene, dressed, cloth=cloth, energies=energies, settle=settle, glitch=glitch)
 
 
 def ordinary(walk: Motion) -> Motion:

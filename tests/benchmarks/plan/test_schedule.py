@@ -53,7 +53,7 @@ def test_what_is_measured_in_a_scene_is_no_part_of_its_cells(plan):
 
 def test_a_cell_that_begins_removes_nothing_that_another_task_of_its_scene_has_made(plan):
     folder, schedule = RunFolder(plan.folder), Schedule(plan)
-    paths = (folder.start_path, folder.body_path, folder.quasi_static_path)
+    paths = (folder.start_path, folder.quasi_static_path)
     made = [path(KICK.name) for path in paths]
     for path in made:
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -117,7 +117,7 @@ def dressed(tmp_path_factory) -> tuple[Path, dict]:
 @pytest.mark.parametrize(
     "name",
     [
-        f"{WORN}/settled.npy", f"{WORN}/body.npy", f"{WORN}/body.vtkhdf",
+        f"{WORN}/settled.npy", f"{WORN}/body.vtkhdf",
         f"{WORN}/simulation.vtkhdf", f"{WORN}/quasi-static.vtkhdf", f"{WORN}/snug.npz",
         f"{WORN}/snug-quasi-static.vtkhdf", "trajectories/tshirt-07_01/simulation.vtkhdf",
         "models/supervised-vertices-seed0.safetensors",

@@ -136,8 +136,8 @@ from pathlib import Path
 from benchmarks.methods import find_method
 from benchmarks.presets import find_preset
 from benchmarks.scenes import of_garment
-assets, body, start, motion = pickle.loads(Path(sys.argv[1]).read_bytes())
-assets = dataclasses.replace(assets, motions={"kick": motion}, bodies={"kick": body})
+assets, start, motion = pickle.loads(Path(sys.argv[1]).read_bytes())
+assets = dataclasses.replace(assets, motions={"kick": motion})
 scene = of_garment("tshirt").scene("kick").at(find_preset("smoke")).build(assets)
 method = find_method("lbfgs-5").make(models=Path("."), seed=0)
 method.prepare(dataclasses.replace(scene, settle=lambda: start))
@@ -148,11 +148,11 @@ NETWORKS = {"torch", "snug.body.skinning", "snug.networks.dressed_body", "snug.n
 
 
 def test_solvers_of_a_dressed_body_load_no_network_library(tmp_path):
-    """Whoever poses the joints needs torch; a cell is given the posed body."""
+    """Networks need torch, whoever poses the body does not."""
     assets = open_assets(SMOKE, embedded_motions(["kick"]), ["tshirt"])
     scene = dressed_scene("kick").build(assets)
     motion, path = assets.motions["kick"], tmp_path / "given"
-    given = (assets, assets.posed_body(motion)[:4], scene.start, motion.cut(0, 4))
+    given = (assets, scene.start, motion.cut(0, 4))
     path.write_bytes(pickle.dumps(given))
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     modules = subprocess.check_output(
