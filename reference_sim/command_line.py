@@ -91,25 +91,35 @@ def progress_bar(*args: Any, **options: Any) -> Any:
     return tqdm(*args, mininterval=seconds, maxinterval=max(10.0, seconds), **options)
 
 
-def announce_compilation() -> None:
-    """Say on stderr that kernels will be compiled, where none lies compiled on disk.
+def compilation_is_due() -> bool:
+    """Return whether no kernel lies compiled on disk."""
+    found = (folder.rglob("reference_sim.*-*/*.nbi") for folder in _kernel_folders())
+    return not any(chain.from_iterable(found))
 
-    The places are those of reference_sim.kernels.kernel_cache, which is not imported: it loads numba.
-    """
-    if given := os.environ.get("NUMBA_CACHE_DIR"):
-        folders = [Path(given)]
-    else:
-        of_user = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-        folders = [Path(__file__).parent, Path(of_user, "numba")]
-    if any(chain.from_iterable(folder.rglob("reference_sim.*-*/*.nbi") for folder in folders)):
+
+def announce_compilation() -> None:
+    """Say on stderr that kernels will be compiled, where none is yet, and where they will lie."""
+    if not compilation_is_due():
         return
-    message = "first use: kernels are compiled, which takes one to five minutes once"
-    if not any(map(_can_be_written, folders)):
+    folders = _kernel_folders()
+    writable = [folder for folder in folders if _can_be_written(folder)]
+    message = "first use: kernels are compiled, about half a minute of each core, once"
+    if not writable:
         message = (
-            "kernels are compiled in one to five minutes, in each process anew, for nothing can be kept in "
+            "kernels are compiled in about half a minute, in each process anew, for nothing can be kept in "
             f"{' or '.join(map(str, folders))}: set NUMBA_CACHE_DIR to a folder that can be written"
         )
+    elif writable != folders:
+        message += f", and kept in {writable[0]}: {folders[0]} is read-only"
     print(message, file=sys.stderr)
+
+
+def _kernel_folders() -> list[Path]:
+    """Return the places of reference_sim.kernels.kernel_cache, which is not imported: it loads numba."""
+    if given := os.environ.get("NUMBA_CACHE_DIR"):
+        return [Path(given)]
+    of_user = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return [Path(__file__).parent, Path(of_user, "numba")]
 
 
 def _can_be_written(folder: Path) -> bool:

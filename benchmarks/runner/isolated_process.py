@@ -46,6 +46,7 @@ def start_loading(*also: str) -> BaseContext:
     On Linux a server forks them. It loads LOADED_BY_ALL and these modules once, while this process does
     something else. Elsewhere libraries may not outlive a fork, and each process loads its own.
     """
+    os.environ["TQDM_DISABLE"] = "1"  # read when tqdm is imported: one line for all is enough
     if sys.platform != "linux":
         return multiprocessing.get_context("spawn")
     context = multiprocessing.get_context("forkserver")
@@ -158,7 +159,6 @@ def end_group(pid: int) -> None:
 
 def _serve(pipe: Connection, folder: RunFolder, assets: Assets | None) -> None:
     lead_a_group()
-    os.environ["TQDM_DISABLE"] = "1"  # one bar for all that are side by side is enough
     context = Context(folder, assets)
     while True:
         try:

@@ -14,13 +14,10 @@ from typing import TYPE_CHECKING
 from benchmarks.plan.cell import TaskId
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.executor import Batch, Executor
+from benchmarks.runner.progress import Progress
 from benchmarks.runner.task import Outcome, Task, failure
 
 if TYPE_CHECKING:
-    from typing import Never
-
-    from tqdm import tqdm
-
     from benchmarks.runner.run_json import RunLog
 
 
@@ -49,31 +46,29 @@ class Runner:
 
         log: follows the stages.
         """
+        unknown = [task for task in self.tasks if task.id not in self.outcomes]
         try:
-            while left := [task for task in self.tasks if task.id not in self.outcomes]:
-                tasks = _able(left, timed=False) or _able(left, timed=True)
-                with log.stage(_titles(tasks)) if log else nullcontext():
-                    (self._alone if tasks[0].process else self._side_by_side)(tasks, executor)
+            with Progress(unknown, executor.back_end.slots) as self.progress:
+                while left := [task for task in unknown if task.id not in self.outcomes]:
+                    tasks = _able(left, timed=False) or _able(left, timed=True)
+                    with log.stage(_titles(tasks), said=True) if log else nullcontext():
+                        (self._alone if tasks[0].process else self._side_by_side)(tasks, executor)
         finally:
             executor.close()
 
     def _side_by_side(self, tasks: Sequence[Task], executor: Executor) -> None:
         """Do tasks, each as soon as its needs have outcomes."""
         waiting = _batches(tasks)
-        with _bar(tasks) as bar:
 
-            def ready() -> Batch | None:
-                for batch in filter(self._is_ready, list(waiting)):
-                    waiting.remove(batch)
-                    wanted = [task for task in batch if self.decide(task)]
-                    bar.update(len(batch) - len(wanted))
-                    if wanted:
-                        return wanted, self._needed(*wanted)
-                return None
+        def ready() -> Batch | None:
+            for batch in filter(self._is_ready, list(waiting)):
+                waiting.remove(batch)
+                if wanted := [task for task in batch if self.decide(task)]:
+                    return wanted, self._needed(*wanted)
+            return None
 
-            for task, outcome in executor.together(ready):
-                self._keep(task, outcome)
-                bar.update()
+        for task, outcome in executor.together(ready):
+            self._keep(task, outcome)
 
     def _is_ready(self, batch: Sequence[Task]) -> bool:
         """Return whether every dependency of the batch has an outcome."""
@@ -82,14 +77,12 @@ class Runner:
 
     def _alone(self, tasks: Sequence[Task], executor: Executor) -> None:
         """Do timed tasks one by one; a process ends as soon as no other task will want it."""
-        with _bar(tasks) as bar:
-            for place, task in enumerate(tasks):
-                if self.decide(task):
-                    self._keep(task, executor.alone(task, self._needed(task)))
-                bar.update()
-                others = (other for other in tasks[place + 1 :] if other.process == task.process)
-                if all(self._find(other)[1] for other in others):
-                    executor.release(task.process)
+        for place, task in enumerate(tasks):
+            if self.decide(task):
+                self._keep(task, executor.alone(task, self._needed(task)))
+            others = (other for other in tasks[place + 1 :] if other.process == task.process)
+            if all(self._find(other)[1] for other in others):
+                executor.release(task.process)
 
     def decide(self, task: Task) -> bool:
         """Return whether the task is to be run now; where not, its outcome is known.
@@ -100,7 +93,9 @@ class Runner:
         if outcome is None:
             for name in task.files:
                 (self.cache.folder.path / name).unlink(missing_ok=True)
+            self.progress.begin(task.stage)
             return True
+        self.progress.end(task)
         self.outcomes[task.id] = replace(outcome, origin=self.cache.origin | outcome.origin)
         if outcome.content:
             self.reused.append(task.title)
@@ -137,6 +132,7 @@ class Runner:
             # a result that is no plain value, a file not there
             kept = self.cache.keep(task, failure(error), self.outcomes)
         self.outcomes[task.id] = kept
+        self.progress.end(task, outcome.seconds)
 
     def preview(self) -> Iterator[tuple[Task, str, Outcome | None]]:
         """Yield each task and what `_find` says. One that would be run is taken to succeed."""
@@ -165,18 +161,16 @@ def _titles(tasks: Sequence[Task]) -> str:
 
 
 def _batches(tasks: Sequence[Task]) -> list[list[Task]]:
-    """Return the tasks handed out together, by stage, the largest first: so workers end at about one time."""
+    """Return the tasks handed out together, by stage, the largest first: so workers end at about one time.
+
+    The largest of all comes before its stage: all else fits in beside it, and two workers do not begin by
+    compiling the same kernels.
+    """
     batches: dict[TaskId, list[Task]] = {}
     for task in tasks:
         batches.setdefault(task.batch_id, []).append(task)
     stages = list(dict.fromkeys(task.stage for task in tasks))
-    return sorted(
-        batches.values(),
-        key=lambda batch: (stages.index(batch[0].stage), -sum(task.work for task in batch)),
-    )
-
-
-def _bar(tasks: Sequence[Task]) -> tqdm[Never]:
-    from reference_sim.command_line import progress_bar
-
-    return progress_bar(total=len(tasks), desc=_titles(tasks))
+    work = {id: sum(task.work for task in batch) for id, batch in batches.items()}
+    order = sorted(batches, key=lambda id: (stages.index(batches[id][0].stage), -work[id]))
+    largest = max(order, key=work.__getitem__, default=None)
+    return [batches[id] for id in sorted(order, key=lambda id: id != largest)]

@@ -77,9 +77,10 @@ class RunLog:
         self.folder.write_config(self.config)
 
     @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        """Announce a stage and keep its wall time, also when it is interrupted."""
-        print(f"== {name}", file=sys.stderr, flush=True)
+    def stage(self, name: str, *, said: bool = False) -> Iterator[None]:
+        """Announce a stage, unless it was, and keep its wall time, also when it is interrupted."""
+        if not said:
+            print(name, file=sys.stderr, flush=True)
         clock = time.perf_counter()
         try:
             yield

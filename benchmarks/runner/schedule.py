@@ -242,7 +242,7 @@ class Schedule:
         if cell.timed:
             return self._timed(cell, cell.id(), run_cell, **fields)
         return Task(
-            kind="cell", name=cell.name, label=cell.label, stage="cells that are not timed",
+            kind="cell", name=cell.name, label=cell.label, stage="untimed methods",
             run=partial(run_cell, cell, self._least(cell)), batch=cell.scene.name,
             deadline=self.preset.cell_seconds, **fields,
         )  # fmt: skip
@@ -253,7 +253,7 @@ class Schedule:
         usual = {"inputs": {"least": least}, "code": RUNNING, "needs": (cell.id(),)}
         more: dict[str, Any] = usual | fields
         return Task(
-            kind=id[0], name=id[1], label=cell.label, stage="cells", run=partial(run, cell, least),
+            kind=id[0], name=id[1], label=cell.label, stage="timed methods", run=partial(run, cell, least),
             process=cell.name, motion=cell.scene.motion if cell.scene.dressed else "",
             deadline=self.preset.cell_seconds, **more,
         )  # fmt: skip
@@ -266,7 +266,7 @@ class Schedule:
         """Return the task that simulates each frame of a scene held still."""
         return Task(
             kind="quasi-static", name=flat(scene.name), label=scene.name,
-            stage="quasi-static answers", silent=True, run=partial(simulate_quasi_static, scene),
+            stage="quasi-static solutions", silent=True, run=partial(simulate_quasi_static, scene),
             needs=(id_of("start", scene),), **self._of_scene(scene),
         )  # fmt: skip
 
@@ -299,7 +299,7 @@ class Schedule:
     def case(self, case: Case) -> Task:
         """Return the task of a known answer or a stress test."""
         return Task(
-            kind="case", name=case.name, label=case.name, stage="validation", run=partial(run_case, case),
+            kind="case", name=case.name, label=case.name, stage="known answers", run=partial(run_case, case),
             warm_up=case.warm_up, deadline=case.seconds, process=case.process,
             inputs=self._machine() | {"declared": declared(case)},
             code=(find_module(case.module), *CASES),

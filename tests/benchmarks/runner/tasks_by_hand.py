@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -91,7 +92,7 @@ def plan_of(folder: Path, *names: str, scene: str = "free_fall", how: str = "", 
 
 def finish(plan: Plan, *stages: str, processes: bool = False) -> Runner:
     """All tasks of these stages, run or reused: here, or in processes of their own."""
-    tasks = [task for task in tasks_of(plan) if task.stage in (stages or ("cells",))]
+    tasks = [task for task in tasks_of(plan) if task.stage in (stages or ("timed methods",))]
     folder = RunFolder(plan.folder)
     runner = Runner(tasks, Cache(folder, retry=plan.retry))
     runner.run(Executor(folder, None, 1) if processes else InProcess(folder))
@@ -135,6 +136,8 @@ def grouped(scene: BuiltScene, positions: dict[str, np.ndarray], **fields) -> Sc
 
 class InProcess:
     """An executor that does everything here: the seam behind which a cluster could stand."""
+
+    back_end = SimpleNamespace(slots=1)
 
     def __init__(self, folder: RunFolder, assets: Assets | None = None) -> None:
         self.folder, self.assets = folder, assets

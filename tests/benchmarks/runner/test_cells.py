@@ -40,7 +40,8 @@ def rows(runner: Runner, plan: Plan) -> dict[str, Row]:
 )
 def test_a_cell_that_goes_wrong_is_an_outcome_with_its_reason(how, word, tmp_path):
     plan = plan_of(tmp_path, "newton-1", how=how)
-    runner = finish(plan, "cells", "metrics", processes=how == "early")  # threads of tests falsify times
+    # Threads of tests falsify times.
+    runner = finish(plan, "timed methods", "metrics", processes=how == "early")
     outcome = runner.outcomes["cell", plan.cells[0].name]
     assert word in outcome.reason and outcome.failed and not outcome.files
     (row,) = rows(runner, plan).values()
@@ -51,20 +52,20 @@ def test_a_cell_that_goes_wrong_is_an_outcome_with_its_reason(how, word, tmp_pat
 def test_many_at_once_are_watched_too(tmp_path):
     plan = plan_of(tmp_path, "newton-1", how="crowded")
     # In a process that ends: its thread goes on.
-    (row,) = rows(finish(plan, "cells", "metrics", processes=True), plan).values()
+    (row,) = rows(finish(plan, "timed methods", "metrics", processes=True), plan).values()
     assert (row.status, row.value) == ("failed", None)
     assert "many at once" in row.reason and "cannot be believed" in row.reason
 
 
 def test_what_a_cell_has_run_stands_where_many_go_wrong(tmp_path):
     plan = plan_of(tmp_path, "newton-1", how="torn")
-    runner = finish(plan, "cells", "metrics")
+    runner = finish(plan, "timed methods", "metrics")
     outcome, first = runner.outcomes["cell", plan.cells[0].name], rows(runner, plan)
     assert (outcome.status, outcome.failed) == ("ok", False)
     assert first["cost/frame"].status == "ok" and "cost/batch" not in first
     assert "many at once: failed: RuntimeError: no two bodies" in first["cost/frame"].reason
     assert RunFolder(tmp_path).trajectory_path("free_fall", "newton-1").is_file()
-    assert rows(finish(plan, "cells", "metrics"), plan).keys() == first.keys()
+    assert rows(finish(plan, "timed methods", "metrics"), plan).keys() == first.keys()
 
 
 def test_a_cell_says_how_long_it_took_and_how_much_memory(tmp_path):
@@ -97,7 +98,7 @@ def test_a_cell_that_is_run_again_leaves_nothing_of_its_earlier_run(tmp_path):
 
     def measured_after(number: int) -> list[str]:
         """Return the methods whose metrics are still up to date once a cell has run again."""
-        finish(plan, "cells", "metrics")
+        finish(plan, "timed methods", "metrics")
         folder.trajectory_path("free_fall", plan.cells[number].method).unlink(missing_ok=True)
         folder.quasi_static_path("free_fall", plan.cells[number].method).touch()
         outcome_of(plan, number)

@@ -8,6 +8,7 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.executor import Executor, TaskProcess
 from benchmarks.runner.loop import Runner
+from benchmarks.runner.progress import Progress
 from benchmarks.runner.task import Task
 from tests.benchmarks.runner.processes_by_hand import alive, finish, ids, task, together, until
 from tests.benchmarks.runner.tasks_by_hand import InProcess
@@ -168,3 +169,20 @@ def test_what_a_task_has_started_ends_when_its_time_is_up(tmp_path):
     until(lambda: not alive(int(outcome.reason)), 5.0)
     assert process.do(task("two"), {}).result["memo"] == ["two"]
     process.close()
+
+
+def test_the_time_left_never_grows_and_a_stage_begins_with_a_line(capsys):
+    tasks = [
+        Task(kind="cell", name=str(n), label="", stage="first" if n < 5 else "second", run=print)
+        for n in range(10)
+    ]
+    progress, seen = Progress(tasks, workers=2), []
+    for each, seconds in zip(tasks, (0.1, 90.0, 3.0, 0.0, 400.0, 0.2, 1.0, 1.0, 700.0, 0.1)):
+        progress.begin(each.stage)
+        progress.time_left()
+        seen.append(progress.shown)
+        progress.end(each, seconds)
+    assert seen == sorted(seen, reverse=True) and seen[-1] < seen[0]
+    lines = capsys.readouterr().err.splitlines()
+    assert [line.partition(";")[0] for line in lines] == ["first: 5 tasks", "second: 5 tasks"]
+    assert all(line.endswith("left") for line in lines)

@@ -1,0 +1,96 @@
+"""Progress of a run: a line as each stage begins, and the time left, which never grows."""
+
+from __future__ import annotations
+
+import math
+import sys
+import threading
+import time
+from collections import Counter
+from collections.abc import Sequence
+
+from benchmarks.plan.cell import TaskId
+from benchmarks.runner.task import Task
+from reference_sim.command_line import SECONDS_OF_A_LOG, compilation_is_due
+
+# [s] on an idle core: of a step of SNUG's training, else of a task of some 60 frames at 1000 vertices.
+EXPECTED = {
+    "start": 2.5, "data": 6.0, "clips": 60.0, "network": 0.04, "cell": 2.5, "repeat": 0.5, "batch": 1.0,
+    "quasi-static": 7.0, "metrics": 2.5, "case": 0.3,
+}  # fmt: skip
+COMPILING, REPORT = 20.0, 20.0  # [s]
+
+
+class Progress:
+    """What of these tasks is left, and how long it may take where so many `workers` are at work.
+
+    Seconds of tasks that have ended correct what is expected of others of their kind. Use it in a `with`:
+    on a terminal a line is drawn anew each second, a file gets one each half minute.
+    """
+
+    def __init__(self, tasks: Sequence[Task], workers: int) -> None:
+        self.left = {task.id: EXPECTED.get(task.kind, 1.0) * task.work for task in tasks}
+        self.alone: set[TaskId] = {task.id for task in tasks if task.process}
+        self.of_stage = Counter(task.stage for task in tasks)
+        self.ended, self.workers = Counter[str](), workers
+        self.seconds, self.expected = (
+            Counter[str](),
+            Counter[str](),
+        )  # of a kind, of tasks that have ended
+        self.compiling = COMPILING if compilation_is_due() else 0.0
+        self.shown, self.stage, self.since = math.inf, "", time.monotonic()
+        self._stopped = threading.Event()
+
+    def begin(self, stage: str) -> None:
+        """Say that a stage begins, the first time."""
+        if stage not in self.ended:
+            self.ended[stage], self.stage = 0, stage
+            self._print(f"{stage}: {self.of_stage[stage]} tasks; {self.time_left()}")
+
+    def end(self, task: Task, seconds: float = 0.0) -> None:
+        """Note that a task has ended; `seconds` that it took, 0 where it was not run."""
+        expected = self.left.pop(task.id)
+        self.ended[task.stage] += 1
+        if seconds:
+            self.since, self.stage = time.monotonic(), task.stage
+            self.seconds[task.kind] += seconds
+            self.expected[task.kind] += expected
+
+    def time_left(self) -> str:
+        """Return how long the rest may take, in words: no more than it said before."""
+        pace = {kind: self.seconds[kind] / self.expected[kind] for kind in self.expected}
+        usual = sum(self.seconds.values()) / max(sum(self.expected.values()), 1e-9) if pace else 1.0
+        alone = beside = 0.0
+        for id, seconds in self.left.items():
+            seconds *= pace.get(id[0], usual)
+            alone, beside = (alone + seconds, beside) if id in self.alone else (alone, beside + seconds)
+        running = time.monotonic() - self.since
+        left = alone + beside / self.workers + (self.compiling if not pace else 0.0) + REPORT
+        self.shown = min(self.shown, max(left - running, REPORT))
+        minutes = self.shown / 60.0
+        return f"about {math.ceil(minutes)} min left" if minutes > 1.0 else "less than a minute left"
+
+    def __enter__(self) -> Progress:
+        """Begin to draw."""
+        if self.left:
+            self._print(f"{len(self.left)} tasks; {self.time_left()}")
+        self._thread = threading.Thread(target=self._draw, name="progress", daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *ended: object) -> None:
+        """Draw no more."""
+        self._stopped.set()
+        self._thread.join()
+
+    def _draw(self) -> None:
+        terminal = sys.stderr.isatty()
+        while not self._stopped.wait(1.0 if terminal else SECONDS_OF_A_LOG):
+            if self.stage:
+                count = f"{self.ended[self.stage]} of {self.of_stage[self.stage]}"
+                line = f"{self.stage}: {count} tasks; {self.time_left()}"
+                self._print(f"{line}\r" if terminal else line, end="" if terminal else "\n")
+
+    def _print(self, line: str, end: str = "\n") -> None:
+        clear = "\r\x1b[K" if sys.stderr.isatty() else ""
+        print(f"{clear}{line}", end=end, file=sys.stderr, flush=True)
