@@ -21,6 +21,8 @@ from benchmarks.results.run_folder import RunFolder
 from reference_sim.obstacle import Obstacle
 from reference_sim.trajectory import Trajectory
 from reports.finished_run import STEP, Run, shown_seeds
+from reports.statistics.outcomes import leads
+from reports.tables.table import scene_in_words
 
 STEPS = 2**16 - 1
 FINEST = 1e-4  # [m] of a step: nothing finer is seen, and noise does not deflate
@@ -92,11 +94,7 @@ def deflated(data: bytes) -> str:
 
 
 BUDGET = 25_000_000  # bytes of the whole page
-FIRST = ("reference", "baseline", "network", "external")  # roles of the methods of page one
-RULE = (
-    "clips of garments first, then whole motions, then scenes without a body; in each of these the "
-    "simulation, baselines, networks and the user's own before all others; the first seed of each method"
-)
+RULE = "first the methods of page one, of these whole motions, clips, then scenes without a body"
 
 
 def groups(folder: RunFolder, run: Run) -> Iterator[tuple[str, dict[str, int]]]:
@@ -106,24 +104,23 @@ def groups(folder: RunFolder, run: Run) -> Iterator[tuple[str, dict[str, int]]]:
     """
     cells = run.cells()
     seeds = shown_seeds(cells)
+    first = leads(run, cells)
     traits = cells.drop_duplicates("scene").set_index("scene")[["garment", "part"]]
     kinds: list[list[str]] = [[], [], []]
     for scene, garment, part in traits.itertuples():
-        kinds[0 if part == "clip" else 1 if garment else 2].append(str(scene))
-    for scenes in kinds:
-        for leading in (True, False):
-            for scene in scenes:
-                methods = run.ordered(seeds[scene].index)
-                methods = [m for m in methods if (run.methods[m].role in FIRST) is leading]
-                chosen = {m: int(seeds[scene, m]) for m in methods}
-                stored = {
-                    m: s for m, s in chosen.items() if folder.trajectory_path(scene, m, s).is_file()
-                }
-                if stored:
-                    yield scene, stored
+        kinds[1 if part == "clip" else 0 if garment else 2].append(str(scene))
+    for leading in (True, False):
+        for scene in (scene for scenes in kinds for scene in scenes):
+            chosen = {m: int(seeds[scene, m]) for m in run.ordered(seeds[scene].index)}
+            stored = {
+                m: s for m, s in chosen.items()
+                if (m in first) is leading and folder.trajectory_path(scene, m, s).is_file()
+            }  # fmt: skip
+            if stored:
+                yield scene, stored
 
 
-SKIN_FACES = 7000  # of the body as it is drawn; depths are those below the whole one
+SKIN_FACES = 5000  # of the body as it is drawn; depths are those below the whole one
 ROOM = 1500  # bytes beside a text: its tags, and what the content says of it
 
 
@@ -166,7 +163,10 @@ def embed(folder: RunFolder, run: Run, budget: int) -> Embedded:
         for method, cloth in cloths.items():
             texts: dict[str, str] = {}
             known = embedded.scenes.get(scene)
-            shown = known or {"body": _kept(texts, _body(body)) if body else None, "methods": {}}
+            shown = known or {
+                "title": scene_in_words(scene), "methods": {},
+                "body": _kept(texts, _body(body)) if body else None,
+            }  # fmt: skip
             pack = _cloth(cloth, references[scene], depths.get(method), run.metrics)
             entry = _kept(texts, pack) | {"ending": _ending(cloth)}
             new = {name: text for name, text in texts.items() if name not in embedded.texts}

@@ -1,6 +1,6 @@
 // What is chosen, and everything that follows from it.
 
-const MOST = 4;
+const MOST = matchMedia('(max-width: 560px)').matches ? 1 : 4; // a phone has room for one
 const SEQUENTIAL = [[52, 84, 122], [62, 137, 140], [150, 176, 104], [228, 190, 88], [214, 110, 50], [160, 28, 38]];
 const FROM_ZERO = [[112, 132, 156], [240, 208, 110], [222, 118, 52], [150, 22, 40]]; // most of it is 0
 const COLOURS = {
@@ -43,11 +43,12 @@ function dot(method) {
   return node;
 }
 
-// At first: the reference, a baseline, SNUG and PBNS; else other networks, then whatever there is.
+// At first: the reference, a baseline, SNUG and PBNS, of one alone SNUG; else other networks, then whatever.
 function firstMethods(available) {
   const role = (name) => available.filter((method) => content.methods[method].role === name);
   const subjects = ['snug', 'pbns'].filter((method) => available.includes(method));
-  const wanted = [...role('reference'), ...role('baseline').slice(0, 1), ...subjects, ...role('network'), ...available];
+  const first = MOST > 1 ? [...role('reference'), ...role('baseline').slice(0, 1)] : [];
+  const wanted = [...first, ...subjects, ...role('external'), ...role('network'), ...available];
   const kept = [...new Set(wanted)].slice(0, MOST);
   return available.filter((method) => kept.includes(method));
 }
@@ -291,7 +292,10 @@ function listen() {
 
 function listTables() {
   const select = byId('table');
-  select.replaceChildren(...content.tables.map((table, k) => element('option', { value: String(k) }, table.caption)));
+  content.tables.forEach((table, k) => {
+    if (select.lastElementChild?.label !== table.group) select.append(element('optgroup', { label: table.group }));
+    select.lastElementChild.append(element('option', { value: String(k) }, table.title));
+  });
   for (const button of document.querySelectorAll('[data-copy]')) {
     button.addEventListener('click', async () => {
       await copyText(tableText(content.tables[Number(select.value)], button.dataset.copy));
@@ -324,7 +328,7 @@ async function start() {
     byId('views').hidden = byId('scale').hidden = true;
   }
   listen();
-  options(byId('scene'), scenes.map((name) => [name, name]), scenes[0]);
+  options(byId('scene'), scenes.map((name) => [name, content.scenes[name].title]), scenes[0]);
   const asked = readAddress(location.hash, content.scenes);
   if (asked) [state.methods, state.colour] = [asked.methods, asked.colour];
   await chooseScene(asked ? asked.scene : scenes[0], asked ? asked.frame : -1);

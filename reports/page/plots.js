@@ -178,9 +178,11 @@ function errorPlot(panel, plot, methods, shown, canShow, choose) {
       names.push([px, py, method.label]);
     }
   }
-  for (const [px, py, label] of names) {
+  let above = -HIGH; // of a name above another
+  for (const [px, py, label] of names.sort((a, b) => a[1] - b[1])) {
     const left = px > WIDE * 0.6;
-    const spot = { x: left ? px - 13 : px + 13, y: py + 4, 'text-anchor': left ? 'end' : 'start', class: 'name' };
+    above = Math.max(py + 4, above + 14);
+    const spot = { x: left ? px - 13 : px + 13, y: above, 'text-anchor': left ? 'end' : 'start', class: 'name' };
     root.append(svg('text', spot, label));
   }
   return root;

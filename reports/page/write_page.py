@@ -16,7 +16,7 @@ import pandas as pd
 
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.files.atomic_files import replacing
-from reports.blocks import BLOCKS, Report, TableBlock
+from reports.blocks import BLOCKS, Heading, Report, TableBlock
 from reports.figures.plotting import style
 from reports.finished_run import Run
 from reports.page.embedded_roll_outs import BUDGET, Embedded, deflated, embed
@@ -66,14 +66,23 @@ def _panel(run: Run, rows: pd.DataFrame, metric: str) -> dict[str, Any] | None:
 
 
 def tables_of(report: Report) -> list[dict[str, Any]]:
-    """Return the tables of the report blocks, then all others with a caption; cells as texts that sort.
-
-    A table without a caption is a file to plot from, and too long for a page.
-    """
-    first = [block.name for block in BLOCKS if isinstance(block, TableBlock)]
-    names = dict.fromkeys((*first, *report.tables))
-    tables = [report.tables[name] for name in names if name in report.tables]
-    return [table_data(report.run, table) for table in tables if table.caption]
+    """Return the tables, under the report's headings or as other metrics; cells are texts that sort."""
+    group = "Answer"
+    groups: dict[str, str] = {}
+    for block in BLOCKS:
+        if isinstance(block, Heading):
+            group = block.title
+        elif isinstance(block, TableBlock) and block.name in report.tables:
+            groups[block.name] = group
+    groups |= {name: "Other metrics" for name in report.tables if name not in groups}
+    return [
+        {
+            "group": group,
+            "title": name.replace("_", " ").capitalize(),
+            **table_data(report.run, report.tables[name]),
+        }
+        for name, group in groups.items()
+    ]
 
 
 def table_data(run: Run, table: Table) -> dict[str, Any]:
@@ -147,21 +156,19 @@ def write_page(folder: RunFolder, report: Report, *, budget: int = BUDGET) -> Pa
 def _page(report: Report, content: dict[str, Any], embedded: Embedded) -> str:
     data = json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     blobs = {"content": deflated(data.encode()), **embedded.texts}
+    sentences = {topic: html.escape(text) for topic, text in headline(report.run)}
+    verdict, remarks = sentences.pop("Verdict", ""), sentences.items()
     return filled(
         "page.html",
         SCRIPTS,
         subtitle=html.escape(report.subtitle),
-        sentences=_sentences(report),
+        verdict=f'<p class="verdict">{verdict}</p>' if verdict else "",
+        remarks="\n".join(f'<p class="sentence"><b>{topic}.</b> {text}</p>' for topic, text in remarks),
         left_out=html.escape(embedded.remark),
         blobs="\n".join(
             f'<script type="text/plain" id="{name}">{text}</script>' for name, text in blobs.items()
         ),
     )
-
-
-def _sentences(report: Report) -> str:
-    pairs = [(html.escape(topic), html.escape(text)) for topic, text in headline(report.run)]
-    return "\n".join(f'<p class="sentence"><b>{topic}.</b> {text}</p>' for topic, text in pairs)
 
 
 def filled(name: str, scripts: Sequence[str], **values: str) -> str:
