@@ -61,9 +61,8 @@ def test_a_run_stops_in_one_line_and_goes_on(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(execution, "make_report", lambda log: "")
     arguments = ["smoke:speed", "--scenes", "free_fall", "--methods", "simulation", "-o"]
     folder, other = RunFolder(tmp_path / "a"), RunFolder(tmp_path / "b")
-    assert (
-        run.main([*arguments, str(other.path)]) == 0
-    )  # kernels that it compiles are files that grow, too
+    # Kernels that it compiles are files that grow, too.
+    assert run.main([*arguments, str(other.path)]) == 0
     (trajectory,) = other.path.rglob("simulation.vtkhdf")
     limit = trajectory.stat().st_size - 1000
     monkeypatch.setattr(execution, "Executor", lambda folder, assets, *_: InProcess(folder, assets))

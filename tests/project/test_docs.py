@@ -17,7 +17,8 @@ from tests.benchmarks.runner.tasks_by_hand import run_in_this_process
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *ROOT.glob("studies/*/*.md")])
-EXTEND, EXAMPLES = ROOT / "docs" / "extend.md", ROOT / "docs" / "examples"
+DOCS = ROOT / "docs"
+EXTEND, TASKS, EXAMPLES = DOCS / "extend.md", DOCS / "tasks.md", DOCS / "examples"
 FILE = re.compile(r"File `([^`]+)`:$")
 # As written they are run by -m slow; in one run by TOGETHER.
 JOINED = ("A method", "A scene", "A metric")
@@ -29,6 +30,17 @@ TOGETHER = (
 LAST_WORDS = {
     "How to add something": "nothing is wrong\n",
     "An energy": "its lowest point is at y = -0.396 m\n",
+}
+# Fewer frames, cells and steps, and no GPU.
+SMALLER = {
+    "cells=20, size": "cells=4, size",
+    r"pins=\[0, 20\]": "pins=[0, 4]",
+    "frames=60": "frames=3",
+    r"^(python -m benchmarks\.(?:export|run --|score).*)$": r"\1 --set sizes.frames=14",
+    r'make_motion\("07_02"\)': r"\g<0>.cut(0, 14)",
+    "steps=4000": "steps=2",
+    "--device cuda": "--device cpu --steps 2",
+    '"reports/published': f'"{ROOT}/reports/published',
 }
 PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 
@@ -50,11 +62,18 @@ def user(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("a user")  # paths may have spaces
     for path in EXAMPLES.glob("*.py"):
         (folder / path.name).write_bytes(path.read_bytes())
-    for section in SECTIONS.values():
-        for before, _, content in blocks(section):
+    for document in (EXTEND, TASKS):
+        for before, _, content in blocks(document.read_text(encoding="utf-8")):
             if match := FILE.search(before):
                 (folder / match[1]).write_text(content, encoding="utf-8")
     return folder
+
+
+def smaller(code: str) -> str:
+    """Make a block of README or of the ten tasks quick."""
+    for whole, part in SMALLER.items():
+        code = re.sub(whole, part, code, flags=re.M)
+    return code
 
 
 def run(folder: Path, line: str) -> str:
@@ -128,15 +147,20 @@ def test_a_method_a_scene_and_a_metric_of_the_examples_run_together(user, tmp_pa
 def test_the_lines_of_python_in_the_readme_run(tmp_path, monkeypatch):
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     (code,) = [text for _, language, text in blocks(readme) if language == "python"]
-    for whole, part in (
-        ("cells=20", "cells=4"),
-        ("pins=[0, 20]", "pins=[0, 4]"),
-        ("frames=60", "frames=3"),
-    ):
-        assert whole in code
-        code = code.replace(whole, part)
     monkeypatch.chdir(tmp_path)
-    exec(code, {"__name__": "__main__"})
+    exec(smaller(code), {"__name__": "__main__"})
+
+
+@pytest.mark.slow
+def test_the_ten_tasks_run_as_written(user, tmp_path):
+    (tmp_path / "height.py").write_bytes((user / "height.py").read_bytes())
+    printed = ""
+    for before, language, text in blocks(TASKS.read_text(encoding="utf-8")):
+        if not FILE.search(before):
+            code = {"sh": "{}", "python": "python - << 'END'\n{}END"}[language]
+            printed += run(tmp_path, code.format(smaller(text)))
+    assert re.search(r"^strain +0\.0811\d* +0\.0427", printed, re.M)  # table 1, as in the results
+    assert (tmp_path / "beside.gif").is_file() and (tmp_path / "gpu.safetensors").is_file()
 
 
 def heading_anchors(path: Path) -> set[str]:

@@ -37,17 +37,7 @@ from tests.snug.body.test_smpl_files import smpl_arrays
 from tests.snug.motion.motion_forms import amc_frame, bvh, cmu_like
 from tests.snug.training.dressing import tailored
 
-NUMBERS = (
-    b"-1",
-    b"0",
-    b"1e300",
-    b"nan",
-    b"inf",
-    b"99999999999999999999",
-    b"9" * 5000,
-    b"1000000000",
-    b"",
-)
+NUMBERS = [*b"-1 0 1e300 nan inf 99999999999999999999".split(), b"9" * 5000, b"1000000000", b""]
 
 
 def mutated(data: bytes, draw: random.Random) -> bytes:
@@ -65,9 +55,8 @@ def mutated(data: bytes, draw: random.Random) -> bytes:
         elif kind == 2:
             data = data[:end] + data[at:]
         elif kind == 3:
-            data = (
-                data[:at] + draw.choice((b"\xff" * 8, b"\xff\xff\xff\x7f", b"\0" * 16)) + data[at + 8 :]
-            )
+            word = draw.choice((b"\xff" * 8, b"\xff\xff\xff\x7f", b"\0" * 16))
+            data = data[:at] + word + data[at + 8 :]
         elif kind == 4 and (matches := list(re.finditer(rb"\d+(\.\d+)?", data))):
             number = draw.choice(matches)
             data = data[: number.start()] + draw.choice(NUMBERS) + data[number.end() :]

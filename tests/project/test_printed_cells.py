@@ -16,11 +16,8 @@ from tests.project.test_layers import ROOT
 
 PUBLISHED = ROOT / "reports" / "published" / "quick" / "results.csv"
 MOTIONS = ("07_02", "01_01_a", "02_07_a")
-NETWORKS = {
-    "snug": "snug",
-    "pbns": "pbns",
-    "supervised-vertices": "supervised",
-}  # the run is of protocol 1.0
+# The run is of protocol 1.0, which calls the network of vertices alone supervised.
+NETWORKS = {"snug": "snug", "pbns": "pbns", "supervised-vertices": "supervised"}
 
 
 @pytest.fixture(scope="module")

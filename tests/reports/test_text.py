@@ -17,13 +17,7 @@ from reports.statistics.effects import EXCESS, Effect
 from reports.statistics.means_and_spreads import Mean
 from reports.tables.table import METHOD, Column, Table
 from reports.text.for_your_paper import latex, write_paper_table
-from reports.text.published_parts import (
-    BEGIN,
-    END,
-    docstring_rows,
-    fill,
-    published_part,
-)
+from reports.text.published_parts import BEGIN, END, docstring_rows, fill, published_part
 from reports.text.text_table import remarks_on, text_rows
 from snug.body.smpl_files import SYNONYMS
 from snug.motion.files import ARRAY_NAMES
@@ -125,13 +119,11 @@ def test_the_table_for_a_paper_has_intervals_counts_protocol_and_columns_of_the_
     lines = pd.read_csv(tmp_path / "for_your_paper.csv", na_values="-").set_index("method")
     assert list(lines.index) == ["simulation", "skinning", "snug"]
     snug = lines.loc["snug"]
-    assert (snug["motions"], snug["seeds"]) == (5, 2) and snug["relative_excess [%]"] == pytest.approx(
-        10, 0.2
-    )
+    assert (snug["motions"], snug["seeds"]) == (5, 2)
+    assert snug["relative_excess [%]"] == pytest.approx(10, 0.2)
     assert snug["relative_excess_low"] < snug["relative_excess [%]"] < snug["relative_excess_high"]
-    assert snug["penetration/surface [%]"] == 2.5 and snug["penetration/surface_low"] == pytest.approx(
-        0.537, 1e-2
-    )
+    assert snug["penetration/surface [%]"] == 2.5
+    assert snug["penetration/surface_low"] == pytest.approx(0.537, 1e-2)
     assert snug["cost/frame [ms]"] == 0.25 and not {"distance/rms [mm]", "own_excess [%]"} & set(lines)
     assert "Protocol 2.0; cite: Neural garments" in snug["caption"] and "abc123" in snug["caption"]
 
