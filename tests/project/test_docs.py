@@ -36,7 +36,7 @@ SMALLER = {
     "cells=20, size": "cells=4, size",
     r"pins=\[0, 20\]": "pins=[0, 4]",
     "frames=60": "frames=3",
-    r"^(python -m benchmarks\.(?:export|run --|score).*)$": r"\1 --set sizes.frames=14",
+    r"^(python -m benchmarks\.(?:export|run full|score).*)$": r"\1 --set sizes.frames=14",
     r'make_motion\("07_02"\)': r"\g<0>.cut(0, 14)",
     "steps=4000": "steps=2",
     "--device cuda": "--device cpu --steps 2",
