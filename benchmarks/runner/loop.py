@@ -93,7 +93,7 @@ class Runner:
         if outcome is None:
             for name in task.files:
                 (self.cache.folder.path / name).unlink(missing_ok=True)
-            self.progress.begin(task.stage)
+            self.progress.begin(task)
             return True
         self.progress.end(task)
         self.outcomes[task.id] = replace(outcome, origin=self.cache.origin | outcome.origin)

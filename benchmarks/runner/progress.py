@@ -21,6 +21,11 @@ EXPECTED = {
 COMPILING, REPORT = 20.0, 20.0  # [s]
 
 
+def expected_of(task: Task) -> float:
+    """Return how long a task may take [s], as long as nothing of its kind has been done."""
+    return EXPECTED.get(task.kind, 1.0) * task.work
+
+
 class Progress:
     """What of these tasks is left, and how long it may take where so many `workers` are at work.
 
@@ -29,44 +34,42 @@ class Progress:
     """
 
     def __init__(self, tasks: Sequence[Task], workers: int) -> None:
-        self.left = {task.id: EXPECTED.get(task.kind, 1.0) * task.work for task in tasks}
-        self.alone: set[TaskId] = {task.id for task in tasks if task.process}
-        self.of_stage = Counter(task.stage for task in tasks)
-        self.ended, self.workers = Counter[str](), workers
-        self.seconds, self.expected = (
-            Counter[str](),
-            Counter[str](),
-        )  # of a kind, of tasks that have ended
+        self.left = {task.id: task for task in tasks}
+        self.of_stage, self.ended = Counter(task.stage for task in tasks), Counter[str]()
+        self.workers = workers
+        self.since: dict[TaskId, float] = {}  # batch -> when that of its tasks began which is at work
+        # Of a kind, of its tasks that have ended [s].
+        self.seconds, self.expected = Counter[str](), Counter[str]()
         self.compiling = COMPILING if compilation_is_due() else 0.0
-        self.shown, self.stage, self.since = math.inf, "", time.monotonic()
+        self.shown, self.stage = math.inf, ""
         self._stopped = threading.Event()
 
-    def begin(self, stage: str) -> None:
-        """Say that a stage begins, the first time."""
-        if stage not in self.ended:
-            self.ended[stage], self.stage = 0, stage
-            self._print(f"{stage}: {self.of_stage[stage]} tasks; {self.time_left()}")
+    def begin(self, task: Task) -> None:
+        """Note that a task begins, and say so of the first of its stage."""
+        self.since.setdefault(task.batch_id, time.monotonic())
+        if task.stage not in self.ended:
+            self.ended[task.stage], self.stage = 0, task.stage
+            self._print(f"{task.stage}: {self.of_stage[task.stage]} tasks; {self.time_left()}")
 
     def end(self, task: Task, seconds: float = 0.0) -> None:
         """Note that a task has ended; `seconds` that it took, 0 where it was not run."""
-        expected = self.left.pop(task.id)
+        del self.left[task.id]
         self.ended[task.stage] += 1
         if seconds:
-            self.since, self.stage = time.monotonic(), task.stage
+            self.since[task.batch_id], self.stage = time.monotonic(), task.stage
             self.seconds[task.kind] += seconds
-            self.expected[task.kind] += expected
+            self.expected[task.kind] += expected_of(task)
 
     def time_left(self) -> str:
         """Return how long the rest may take, in words: no more than it said before."""
-        pace = {kind: self.seconds[kind] / self.expected[kind] for kind in self.expected}
-        usual = sum(self.seconds.values()) / max(sum(self.expected.values()), 1e-9) if pace else 1.0
-        alone = beside = 0.0
-        for id, seconds in self.left.items():
-            seconds *= pace.get(id[0], usual)
-            alone, beside = (alone + seconds, beside) if id in self.alone else (alone, beside + seconds)
-        running = time.monotonic() - self.since
-        left = alone + beside / self.workers + (self.compiling if not pace else 0.0) + REPORT
-        self.shown = min(self.shown, max(left - running, REPORT))
+        pace = {kind: self.seconds[kind] / self.expected[kind] for kind in list(self.expected)}
+        usual = sum(self.seconds.values()) / sum(self.expected.values()) if pace else 1.0
+        now, since, left = time.monotonic(), dict(self.since), REPORT + self.compiling * (not pace)
+        for task in list(self.left.values()):
+            seconds = expected_of(task) * pace.get(task.kind, usual)
+            seconds = max(seconds - (now - since.pop(task.batch_id, now)), 0.0)
+            left += seconds if task.process else seconds / self.workers
+        self.shown = min(self.shown, left)
         minutes = self.shown / 60.0
         return f"about {math.ceil(minutes)} min left" if minutes > 1.0 else "less than a minute left"
 

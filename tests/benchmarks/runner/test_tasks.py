@@ -178,7 +178,7 @@ def test_the_time_left_never_grows_and_a_stage_begins_with_a_line(capsys):
     ]
     progress, seen = Progress(tasks, workers=2), []
     for each, seconds in zip(tasks, (0.1, 90.0, 3.0, 0.0, 400.0, 0.2, 1.0, 1.0, 700.0, 0.1)):
-        progress.begin(each.stage)
+        progress.begin(each)
         progress.time_left()
         seen.append(progress.shown)
         progress.end(each, seconds)
