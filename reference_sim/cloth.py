@@ -63,13 +63,7 @@ class Cloth:
                     f"rest_uv has shape {uv.shape}: expected finite ({len(positions)}, 2) or "
                     f"({len(faces)}, 3, 2)"
                 )
-        for name, value in (
-            ("rest_positions", positions),
-            ("faces", faces),
-            ("pins", pins),
-            ("rest_uv", uv),
-        ):
-            object.__setattr__(self, name, value)
+        vars(self).update(rest_positions=positions, faces=faces, pins=pins, rest_uv=uv)
         small = np.flatnonzero(~(self.areas > 1e-12 * self.areas.max()))
         if small.size:
             raise MeshError(
@@ -131,40 +125,7 @@ class Cloth:
 
     @cached_property
     def _edge_table(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Edges (E, 2), adjacent faces (E, 2) with -1 at the boundary, opposite vertices (E, 2)."""
-        half = self.faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-        opposite = self.faces[:, [2, 0, 1]].ravel()
-        low, high = half.min(1), half.max(1)
-        key = low * self.vertex_count + high
-        order = np.argsort(key, kind="stable")
-        unique, start, count = np.unique(key[order], return_index=True, return_counts=True)
-        if (count > 2).any():
-            bad = np.argmax(count > 2)
-            edge = unique[bad]
-            faces = order[start[bad] :][: count[bad]] // 3
-            raise MeshError(
-                f"edge ({edge // self.vertex_count}, {edge % self.vertex_count}) has {count[bad]} faces "
-                f"{sorted(faces.tolist())}: a cloth is manifold, split it"
-            )
-        edges = np.stack([unique // self.vertex_count, unique % self.vertex_count], axis=1)
-        faces = np.full((len(unique), 2), -1, dtype=np.int64)
-        tips = np.full((len(unique), 2), -1, dtype=np.int64)
-        forward = half[:, 0] < half[:, 1]
-        for side in (0, 1):
-            has = count > side
-            halves = order[start[has] + side]
-            # Side 0 is the face that walks the edge from its lower to its higher vertex.
-            column = np.where(forward[halves], 0, 1)
-            taken = faces[has, column] >= 0
-            if taken.any():
-                bad = np.flatnonzero(has)[taken][0]
-                raise MeshError(
-                    f"faces {faces[bad].max()} and {halves[taken][0] // 3} walk edge "
-                    f"({edges[bad, 0]}, {edges[bad, 1]}) the same way: make the winding consistent"
-                )
-            faces[np.flatnonzero(has), column] = halves // 3
-            tips[np.flatnonzero(has), column] = opposite[halves]
-        return edges, faces, tips
+        return edge_table(self.faces, self.vertex_count)
 
     @property
     def edges(self) -> np.ndarray:
@@ -204,6 +165,45 @@ class Cloth:
     def hinge_areas(self) -> np.ndarray:
         """(H,) sum of the two rest areas beside the hinge [m^2]."""
         return self.areas[self._edge_table[1][self._inner]].sum(axis=1)
+
+
+def edge_table(faces: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return edges (E, 2), lower vertex first, sorted; the faces beside and the vertices opposite (E, 2).
+
+    The first of the two faces walks the edge from its lower to its higher vertex; -1 at the boundary.
+    Raises MeshError for an edge with more faces, or two that walk it the same way.
+    """
+    half = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    opposite = faces[:, [2, 0, 1]].ravel()
+    low, high = half.min(1), half.max(1)
+    key = low * vertex_count + high
+    order = np.argsort(key, kind="stable")
+    unique, start, count = np.unique(key[order], return_index=True, return_counts=True)
+    edges = np.stack(np.divmod(unique, vertex_count), axis=1)
+    if (count > 2).any():
+        bad = np.argmax(count > 2)
+        sharing = sorted((order[start[bad] :][: count[bad]] // 3).tolist())
+        raise MeshError(
+            f"edge ({edges[bad, 0]}, {edges[bad, 1]}) has {count[bad]} faces {sharing}: a surface is "
+            "manifold, split it"
+        )
+    beside = np.full((len(unique), 2), -1, dtype=np.int64)
+    tips = np.full((len(unique), 2), -1, dtype=np.int64)
+    forward = half[:, 0] < half[:, 1]
+    for side in (0, 1):
+        has = count > side
+        halves = order[start[has] + side]
+        column = np.where(forward[halves], 0, 1)
+        taken = beside[has, column] >= 0
+        if taken.any():
+            bad = np.flatnonzero(has)[taken][0]
+            raise MeshError(
+                f"faces {beside[bad].max()} and {halves[taken][0] // 3} walk edge "
+                f"({edges[bad, 0]}, {edges[bad, 1]}) the same way: make the winding consistent"
+            )
+        beside[np.flatnonzero(has), column] = halves // 3
+        tips[np.flatnonzero(has), column] = opposite[halves]
+    return edges, beside, tips
 
 
 def check_mesh(positions: np.ndarray, faces: np.ndarray) -> None:

@@ -18,7 +18,7 @@ import numpy as np
 
 from benchmarks.metric import Measurements, metrics_of
 from benchmarks.metrics.penetration_and_distances import MM
-from reference_sim.geometry.topology import triangle_areas
+from reference_sim.geometry.topology import corner_areas
 
 if TYPE_CHECKING:
     from benchmarks.metric import Faces, Floats, RollOut, Vertices
@@ -37,7 +37,7 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
     if not len(x) or np.abs(x).max() > LOST:
         return {}
     faces, others = roll_out.trajectory.faces, reference.trajectory.faces
-    if not all(triangle_areas(frame, faces).any() for frame in x):
+    if not all(corner_areas(frame[faces]).any() for frame in x):
         return {}
     sampled = np.unique(np.linspace(0, len(x) - 1, SAMPLED_FRAMES).round().astype(int))
     measures = [chamfer_and_angle(x[frame], faces, y[frame], others) for frame in sampled]
@@ -65,7 +65,7 @@ def _one_way(x: Vertices, faces: Faces, y: Vertices, others: Faces) -> tuple[flo
     angles = np.arctan2(
         np.linalg.norm(np.cross(here, of_nearest), axis=1), (here * of_nearest).sum(axis=1)
     )
-    weights = np.bincount(faces.ravel(), np.repeat(triangle_areas(x, faces), 3), len(x))
+    weights = np.bincount(faces.ravel(), np.repeat(corner_areas(x[faces]), 3), len(x))
     means = np.average(np.stack([np.sqrt(squared), angles]), axis=1, weights=weights)
     return float(means[0]), float(means[1])
 

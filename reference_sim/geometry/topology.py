@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from reference_sim.cloth import MeshError
+from reference_sim.cloth import MeshError, edge_table
 
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
@@ -16,14 +16,6 @@ OPEN_SEAM = 0.05  # mean boundary edges; boundary vertices nearer than that are 
 def half_edges(faces: Index) -> Index:
     """Return the directed edges (3F,2) of faces (F,3), three for each face in turn, along its winding."""
     return faces[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2)
-
-
-def edge_uses(faces: Index) -> tuple[Index, Index]:
-    """Return the edges (E,2) of faces (F,3), the lower vertex first, and the number of their faces (E,).
-
-    Edges are sorted. One of the boundary has one face.
-    """
-    return np.unique(np.sort(half_edges(faces), axis=1), axis=0, return_counts=True)
 
 
 def boundary_loops(faces: Index) -> list[Index]:
@@ -59,8 +51,8 @@ def refuse_open_seams(positions: Array, faces: Index) -> None:
     """
     from scipy.spatial import cKDTree
 
-    edges, uses = edge_uses(faces)
-    rim = edges[uses == 1]
+    edges, beside, _ = edge_table(faces, len(positions))
+    rim = edges[(beside < 0).any(axis=1)]
     if not len(rim):
         return
     length = np.linalg.norm(positions[rim[:, 0]] - positions[rim[:, 1]], axis=1).mean()
@@ -76,11 +68,6 @@ def refuse_open_seams(positions: Array, faces: Index) -> None:
         f"{len(np.unique(apart))} vertices of a seam lie up to {gap:.2g} mm apart, one at ({place}) m: merge "
         f"vertices closer than {1.1 * gap:.2g} mm; where a slit is meant, open it wider"
     )
-
-
-def triangle_areas(points: Array, faces: Index) -> Array:
-    """Return the areas (F,) [m^2] of the faces (F,3) between points (V,3) [m]."""
-    return corner_areas(points[faces])
 
 
 def corner_areas(corners: Array) -> Array:
@@ -115,36 +102,19 @@ def check_closed(positions: np.ndarray, faces: np.ndarray) -> None:
     if not np.isfinite(positions).all():
         frame, vertex, _ = np.argwhere(~np.isfinite(positions))[0]
         raise MeshError(f"obstacle vertex {vertex} of frame {frame} is not finite")
-    _check_edges(faces, positions.shape[1])
+    try:
+        edges, beside, _ = edge_table(faces, positions.shape[1])
+    except MeshError as error:
+        raise MeshError(f"obstacle is not closed: {error}") from None
+    lone = np.flatnonzero((beside < 0).any(axis=1))
+    if len(lone):
+        edge, face = tuple(edges[lone[0]].tolist()), beside[lone[0]].max()
+        one = f"edge {edge} of face {face} has one face only"
+        raise MeshError(f"obstacle is not closed: {one}: fill the hole")
     for frame, x in enumerate(positions):
-        _check_shape(x[faces], frame)
-
-
-def _check_edges(faces: np.ndarray, size: int) -> None:
-    """Refuse an edge that is not between exactly two faces that walk it in opposite directions."""
-    half = half_edges(faces)
-    undirected = np.sort(half, axis=1) @ np.array([size, 1])
-    _, inverse, count = np.unique(undirected, return_inverse=True, return_counts=True)
-    _, again, times = np.unique(half @ np.array([size, 1]), return_inverse=True, return_counts=True)
-    for wrong, problem in (
-        (count[inverse] == 1, "has one face only: fill the hole"),
-        (count[inverse] > 2, "has more than two faces: separate what meets there"),
-        (times[again] > 1, "is walked the same way by the face beside it: wind all faces outwards"),
-    ):
-        if wrong.any():
-            k = int(np.argmax(wrong))
-            raise MeshError(
-                f"obstacle is not closed: edge ({half[k, 0]}, {half[k, 1]}) of face {k // 3} {problem}"
-            )
-
-
-def _check_shape(corner: np.ndarray, frame: int) -> None:
-    """Refuse faces (F, 3, 3) of one frame without an area, or with no positive volume inside."""
-    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    area = np.sqrt(np.einsum("fi,fi->f", normal, normal))
-    if not area.min() > LEAST_AREA_RATIO * area.mean():
-        raise MeshError(f"obstacle face {int(area.argmin())} has no area in frame {frame}: remove it")
-    if frame == 0:
-        volume = np.einsum("fi,fi->", corner[:, 0], normal) / 6
-        if not volume > 0:
-            raise MeshError(f"obstacle is inside out (volume {volume:.3g} m^3): reverse its faces")
+        area = corner_areas(x[faces])
+        if not area.min() > LEAST_AREA_RATIO * area.mean():
+            raise MeshError(f"obstacle face {area.argmin()} has no area in frame {frame}: remove it")
+    a, b, c = positions[0][faces].transpose(1, 0, 2)
+    if not (volume := np.einsum("fi,fi->", a, np.cross(b - a, c - a)) / 6) > 0:
+        raise MeshError(f"obstacle is inside out (volume {volume:.3g} m^3): reverse its faces")

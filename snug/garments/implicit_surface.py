@@ -24,7 +24,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
-from reference_sim.geometry.topology import Array, Index, edge_uses
+from reference_sim.cloth import edge_table
+from reference_sim.geometry.topology import Array, Index
 from snug.body.parametric_body import Body
 from snug.body.skeleton import JOINT
 
@@ -214,7 +215,7 @@ def legs_part(body: Body, room: float) -> float:
 
 def _edges(body: Body, bones: Sequence[str]) -> Index:
     """Return the edges (E,2) of the body between vertices that follow `bones`."""
-    edges, _ = edge_uses(body.faces)
+    edges = edge_table(body.faces, len(body.template))[0]
     return edges[skin_following(body, bones)[edges].all(axis=1)]
 
 

@@ -13,14 +13,15 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from reference_sim.cloth import edge_table
 from reference_sim.geometry.surface import vertex_normals
 from reference_sim.geometry.topology import (
     Array,
     Index,
     boundary_loops,
     corner_angles,
+    corner_areas,
     half_edges,
-    triangle_areas,
 )
 from snug.body.parametric_body import Body
 from snug.garments.cuts import SEAM, CutPlane, cut_sheet, outlines
@@ -34,21 +35,6 @@ RELAXATION_STEP = 0.2
 RELAXATIONS = 40  # rounds of relax
 
 
-def interior_edges(faces: Index) -> tuple[Index, Index, Index]:
-    """Return edges with two faces: ends (E,2) as wound in the first, faces (E,2), far corners (E,2)."""
-    halves = half_edges(faces)
-    key = np.sort(halves, axis=1) @ [int(faces.max()) + 1, 1]
-    order = np.argsort(key, kind="stable")
-    twin = np.flatnonzero(key[order][1:] == key[order][:-1])
-    first, second = order[twin], order[twin + 1]
-    opposite = faces[:, [2, 0, 1]].reshape(-1)
-    return (
-        halves[first],
-        np.stack([first // 3, second // 3], 1),
-        np.stack([opposite[first], opposite[second]], 1),
-    )
-
-
 def _angle_cotangent(tip: Array, a: Array, b: Array) -> Array:
     """Return the cotangents (N,) of the angles at `tip`."""
     u, v = a - tip, b - tip
@@ -59,7 +45,9 @@ def delaunay_flips(points: Array, faces: Index, *, passes: int = 3) -> Index:
     """Flip interior edges whose two opposite angles add up to more than pi; return the faces."""
     faces = faces.copy()
     for _ in range(passes):
-        ends, sides, far = interior_edges(faces)
+        ends, sides, far = edge_table(faces, len(points))
+        inner = (sides >= 0).all(axis=1)
+        ends, sides, far = ends[inner], sides[inner], far[inner]
         p, q, r, s = points[ends[:, 0]], points[ends[:, 1]], points[far[:, 0]], points[far[:, 1]]
         excess = _angle_cotangent(r, p, q) + _angle_cotangent(s, p, q)
         # A flip must not turn a triangle over: both new normals agree with the old ones' sum.
@@ -90,7 +78,7 @@ def relax(
     points = points.copy()
     for _ in range(RELAXATIONS):
         faces = delaunay_flips(points, faces, passes=1)
-        pull = triangle_areas(points, faces) ** EVENNESS
+        pull = corner_areas(points[faces]) ** EVENNESS
         centroids = points[faces].mean(axis=1)
         weight = np.zeros(len(points))
         target = np.zeros_like(points)
@@ -276,7 +264,7 @@ def _keep_off(body: Body, points: Array, faces: Index, cuts: list[CutPlane], cle
 
 def _check_even(points: Array, faces: Index, wanted: int) -> None:
     """Raise ValueError for a triangle too small, large or sharp, and for another number of openings."""
-    areas = triangle_areas(points, faces)
+    areas = corner_areas(points[faces])
     ratio = areas / areas.mean()
     if ratio.min() < AREA_BOUNDS[0] or ratio.max() > AREA_BOUNDS[1]:
         raise ValueError(f"triangle areas from {ratio.min():.2f} to {ratio.max():.2f} of the mean")

@@ -29,8 +29,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from reference_sim.cloth import edge_table
 from reference_sim.files.atomic_files import replacing
-from reference_sim.geometry.topology import edge_uses
 from snug.body.skinning import skin, unskin
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
@@ -223,11 +223,12 @@ def smooth_offsets(offsets: np.ndarray, faces: np.ndarray) -> np.ndarray:
     from scipy.sparse import coo_array, diags_array  # a network of another kind trains without scipy
 
     count = offsets.shape[1]
-    edges, uses = edge_uses(faces)
+    edges, beside, _ = edge_table(faces, count)
+    alone = (beside < 0).any(axis=1)
     on_rim = np.zeros(count, dtype=bool)
-    on_rim[edges[uses == 1]] = True
+    on_rim[edges[alone]] = True
     pairs = np.concatenate([edges, edges[:, ::-1]])
-    rim = np.concatenate([uses == 1] * 2)
+    rim = np.concatenate([alone] * 2)
     pairs = pairs[rim | ~on_rim[pairs[:, 0]]]
     near = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count)).tocsr()
     mean = diags_array(1.0 / near.sum(axis=1)) @ near

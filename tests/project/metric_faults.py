@@ -65,7 +65,7 @@ METRIC_FAULTS = {
     ),
     "test_surface_distance": (
         Fault("one way", "chamfer_and_angle", "(forth[0] + back[0]) / 2.0", "forth[0]"),
-        Fault("every vertex alike", "_one_way", "np.repeat(triangle_areas(x, faces), 3), len(x))",
+        Fault("every vertex alike", "_one_way", "np.repeat(corner_areas(x[faces]), 3), len(x))",
               "minlength=len(x))"),
         Fault("squared distances", "_one_way", "np.stack([np.sqrt(squared), angles])",
               "np.stack([squared, angles])"),
