@@ -1,7 +1,6 @@
 """Case: one row whose answer is known before anything is computed, or whose failure has to be reported.
 
-A module of cases is imported to list them, so it loads what it measures with where it is used: inside its
-functions, or by names of the faces `reference_sim` and `reference_sim.energies`, which load on first use.
+A module of cases is imported to list them: it loads what is slow inside its functions.
 """
 
 from __future__ import annotations
@@ -11,8 +10,7 @@ import inspect
 import math
 import warnings
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
@@ -74,7 +72,10 @@ class Case:
     def run(self) -> Row:
         """Measure here and now and return the row. What is raised becomes a failed row with its reason."""
         try:
-            with slow_paths_allowed():
+            from reference_sim.kernels.fast_kernels import SlowPathWarning
+
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", SlowPathWarning)  # a case is not timed
                 measured = getattr(load(self.module), self.function)(**self.options)
             if isinstance(measured, Mapping):
                 measured = measured[self.name]
@@ -92,8 +93,7 @@ class Case:
 
     def warm_up(self) -> None:
         """Compile what the first case of a process would otherwise compile within its deadline."""
-        with slow_paths_allowed():
-            getattr(load(self.module), "warm_up", lambda: None)()
+        getattr(load(self.module), "warm_up", lambda: None)()
 
     def judged(self, value: float, expected: float | None) -> Measurement:
         """Judge a number: it is ok where it is finite and within the tolerance of the expected one."""
@@ -151,13 +151,3 @@ def cases_of(module: str) -> tuple[Case, ...]:
     """Import a module and return the cases that its functions declare."""
     importlib.import_module(module)
     return tuple(_declared[module])
-
-
-@contextmanager
-def slow_paths_allowed() -> Iterator[None]:
-    """Say nothing of terms without a fast kernel: a case is not timed."""
-    from reference_sim.kernels.fast_kernels import SlowPathWarning
-
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SlowPathWarning)
-        yield

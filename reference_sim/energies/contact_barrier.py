@@ -11,9 +11,8 @@ Distances, pairs, their derivatives and collision detection are those of the pac
 MIT licence), which *is* the definition: there is none in torch. Networks are trained with ContactPenalty.
 
 Beyond a touch the energy means nothing: a distance has no sign. Hence `largest_step` bounds every line
-search by continuous collision detection, and a step starts without an intersection: by `ccd_fraction` the
-simulator moves the cloth from the start of the step as far as nothing meets, minimises there to gain
-distance, and goes on. Contact with a body is another term's.
+search by continuous collision detection, and a step starts without an intersection, see `StepMinimiser`.
+Contact with a body is another term's.
 """
 
 from __future__ import annotations

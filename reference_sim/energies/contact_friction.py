@@ -68,9 +68,13 @@ class ContactFriction(Energy):
             self.forces = self._coulomb(samples, skin, planes.normals)
         elif last and last[0].obstacle is step.obstacle and last[0].frame == step.frame - 1:
             self.forces = self._coulomb(samples, last[1].points, last[1].normals)
-        elif last and _same_step(last[0], step):
-            pass  # frozen again at another guess: the force of the step before stays
-        else:  # left over from another run, or a frame that was jumped to
+        elif not (
+            last
+            and (last[0].obstacle, last[0].frame) == (step.obstacle, step.frame)
+            and np.array_equal(last[0].previous, step.previous)
+        ):
+            # Left over from another run, or a frame that was jumped to; the same step is frozen again at
+            # another guess, and the force of the step before stays.
             self.forces = None
         self.anchors, self.normals = samples + planes.points - skin, planes.normals
         self.threshold = self.speed * step.dt
@@ -124,12 +128,6 @@ class ContactFriction(Energy):
         w = self.weights[elements]
         curvature = 2 * forces[elements] / self.threshold
         return elements, curvature[:, None, None] * w[:, :, None] * w[:, None, :]
-
-
-def _same_step(one: Step, other: Step) -> bool:
-    """Return whether both lead from the same positions to the same frame."""
-    same = one.obstacle is other.obstacle and one.frame == other.frame
-    return same and np.array_equal(one.previous, other.previous)
 
 
 @njit(cache=True, inline="always")

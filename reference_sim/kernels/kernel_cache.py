@@ -20,7 +20,7 @@ import hashlib
 import os
 import tempfile
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cache, partial
 from importlib import import_module
 from pathlib import Path
@@ -60,8 +60,13 @@ def njit(**options: Any) -> Callable[[Any], Any]:
             _digests[module] = _digest(function)
             _folders[module] = _folder(function, _digests[module])
         folder = _folders[module] if options.get("cache") else None
-        with _locator_in_use():
+        # While it decorates: kernels of other packages keep their own.
+        given = _config.CACHE_LOCATOR_CLASSES
+        _config.CACHE_LOCATOR_CLASSES = f"{__name__}.{KernelLocator.__name__}"
+        try:
             return numba.njit(**(options | {"cache": folder is not None}))(function)
+        finally:
+            _config.CACHE_LOCATOR_CLASSES = given
 
     return decorate
 
@@ -80,17 +85,6 @@ class KernelLocator(InTreeCacheLocator):
     def get_source_stamp(self) -> str:
         """Return the digest by which numba knows that the source is the same."""
         return _digests[self._module]
-
-
-@contextlib.contextmanager
-def _locator_in_use() -> Iterator[None]:
-    """Let numba ask this locator while it decorates; kernels of other packages keep their own."""
-    given = _config.CACHE_LOCATOR_CLASSES
-    _config.CACHE_LOCATOR_CLASSES = f"{__name__}.{KernelLocator.__name__}"
-    try:
-        yield
-    finally:
-        _config.CACHE_LOCATOR_CLASSES = given
 
 
 def _digest(function: Any) -> str:

@@ -56,14 +56,10 @@ class FactorisedHessian:
 
     def factorise(self, values: np.ndarray, shift: float | np.ndarray) -> bool:
         """Factorise the values plus shift M/dt^2; False if that is not positive definite."""
-        return self._solver.factorise(self._shifted(values, shift))
-
-    def _shifted(self, values: np.ndarray, shift: float | np.ndarray) -> np.ndarray:
-        if not np.any(shift):
-            return values
-        values = values.copy()
-        values[self._pattern.diagonal] += shift * self.metric
-        return values
+        if np.any(shift):
+            values = values.copy()
+            values[self._pattern.diagonal] += shift * self.metric
+        return self._solver.factorise(values)
 
     def solve(self, b: np.ndarray) -> np.ndarray:
         """Solve with the last factorisation: b (3n,)."""
@@ -103,7 +99,7 @@ def convergence_check(run: NewtonRun, values: np.ndarray, round_off: float) -> S
             f"round-off: up to {round_off:.1e} in the residual, {residual:.1e}, tolerance {tolerance:.1e}"
         )
     if run.factorise(values, run.hessian.tiny_shift(values)):
-        step = float(np.abs(run.solve(-run.g)).max(initial=0.0))
+        step = float(np.abs(run.hessian.solve(-run.g)).max(initial=0.0))
         small = step <= step_tolerance or residual == 0.0
         if not small and run.factorise(values, 0.0):
             return None
@@ -143,6 +139,6 @@ def most_negative(run: NewtonRun, values: np.ndarray) -> np.ndarray | None:
             return None
     v = np.random.default_rng(0).standard_normal(len(run.g))
     for _ in range(POWER):
-        v = run.solve(run.hessian.metric * v)
+        v = run.hessian.solve(run.hessian.metric * v)
         v = v / np.abs(v).max()
     return v

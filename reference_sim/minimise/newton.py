@@ -3,9 +3,7 @@
 Each iteration solves H p = -g and takes the full step. Where the Cholesky factorisation of H does not
 exist, a share of the elements' negative curvature is taken out, CONVEXITY at one projection level after
 another, and only when all of it was not enough (cloth without inertia) H is shifted by sigma M/dt^2.
-Taking all of it out always, as is common, needs several times the iterations once cloth wrinkles. The
-first iteration of a step of moving cloth nearly always needs all of it out: with start_projected=True it
-begins so.
+Taking all of it out always, as is common, needs several times the iterations once cloth wrinkles.
 
 The minimum of stiff cloth lies along a narrow, curved valley of the energy. A full step along it ends
 where stresses computed from the strain are false by orders of magnitude. So the Hessian takes the
@@ -13,9 +11,6 @@ stresses that the step predicted (Magisano, Leonetti and Garcea 2017). Where a f
 energy, up to WATCHDOG_STEPS further ones go on from there (the watchdog of Chamberlain et al. 1982). Only
 a point below their start is kept; if none comes, they are taken back, and a line search along the true
 Newton direction takes over.
-
-A factorisation costs ten times as much as solving with it and looking at the energy. So with reuse=True
-it serves as the first guess of L-BFGS after its own step, as long as that goes on well.
 """
 
 from __future__ import annotations
@@ -58,7 +53,8 @@ class Newton:
         tolerance: largest relative residual at the end, see `Result.gradient_norm`.
         max_iterations: before giving up; every direction solved for is one, also one that is taken back.
         timeout: seconds before giving up.
-        reuse: whether a factorisation serves further quasi-Newton steps, each of them an iteration.
+        reuse: whether a factorisation serves as the first guess of further L-BFGS steps, each of them an
+            iteration, while that goes on well: it costs ten times as much as solving with it.
         start_projected: whether the first iterations take all negative curvature out: one Hessian is then
             assembled where the search for the least projection assembles five.
     """
@@ -86,10 +82,7 @@ class Newton:
 
     def minimise(self, x0: np.ndarray, *, after: Descent | None = None) -> Result:
         """Minimise from x0 (V, 3) [m]; counts and clock go on from those of `after`."""
-        return self.descend(NewtonRun(self, x0, after))
-
-    def descend(self, run: NewtonRun) -> Result:
-        """Minimise from where `run` is."""
+        run = NewtonRun(self, x0, after)
         try:
             result = run.result(iterate(self, run))
         finally:
@@ -129,7 +122,7 @@ class Newton:
     def step(self, run: NewtonRun) -> Stop | None:
         """Go on with the last factorisation while it serves, else with the Hessian that was assembled."""
         if run.residuals:
-            if run.quasi_newton_step(run.history, run.solve):
+            if run.quasi_newton_step(run.history, self.hessian.solve):
                 run.quasi_newton_steps += 1
                 run.residuals.append(run.gradient_norm())
                 return None
@@ -173,10 +166,6 @@ class NewtonRun(Descent):
         self.factorised = self.hessian.factorise(values, shift)
         self.factorisations += 1
         return self.factorised
-
-    def solve(self, b: np.ndarray) -> np.ndarray:
-        """Solve with the last factorisation, as the Hessian does."""
-        return self.hessian.solve(b)
 
     def first_projection(self) -> int:
         """Return the level to begin with: wrinkled cloth stays near that of the last step for a while."""
@@ -252,7 +241,7 @@ class NewtonRun(Descent):
                 return np.full_like(self.g, np.nan), projection
             else:
                 shift = max(4 * shift, 1.0)
-        p = self.solve(-self.g)
+        p = self.hessian.solve(-self.g)
         return p, projection
 
     def line_search_step(self, projection: int, predicted: bool) -> bool:
@@ -267,7 +256,7 @@ class NewtonRun(Descent):
             projection, shift = projection - 1, 1.0
         while shift <= MAX_SHIFT:
             if self.factorise(self.assemble(CONVEXITY[projection]), shift):
-                p = self.solve(-self.g)
+                p = self.hessian.solve(-self.g)
                 slope = dot(self.g, p)
                 if np.isfinite(slope) and slope < 0 and self.line_search(p, slope):
                     self.projection_level, self.raised = projection, projection > first

@@ -197,9 +197,7 @@ def without_feet(layouts):
 
 
 ELBOW = np.where(np.arange(24) == 18, 1e6, 1.0)[:, None]
-WRIST = 0.4 * np.outer(np.arange(24) == JOINT["left_wrist"], [0, -1, 0])
 ANKLE = 0.1 * np.outer(np.arange(24) == JOINT["left_ankle"], [1, 0, 0])
-FORWARD = 0.14 * np.outer(np.arange(24) == JOINT["right_ankle"], [0, 0, 1])
 BEFORE = 0.11 * np.outer(np.arange(24) == JOINT["left_wrist"], [0, 0, 1])
 
 
@@ -215,11 +213,9 @@ BEFORE = 0.11 * np.outer(np.arange(24) == JOINT["left_wrist"], [0, 0, 1])
         (without_feet, "a hole at vertex"),
         (changed("f", lambda f: f[:, ::-1]), "inside out"),
         (changed("joints", lambda j: j + ANKLE, "plain"), "left leg is 10 degrees off the T pose"),
-        (changed("joints", lambda j: j + FORWARD, "plain"), "right leg is"),
         (changed("joints", lambda j: j + BEFORE, "plain"), "left arm is 13 degrees off the T pose"),
-        (changed("joints", lambda j: j + WRIST, "plain"), "left arm is 39 degrees off the T pose"),
     ],
-    ids=range(12),
+    ids=range(10),
 )
 def test_a_broken_body_is_refused_in_one_line(layouts, tmp_path, change, says):
     path = saved(tmp_path / "broken.npz", change(layouts))
