@@ -52,48 +52,17 @@ class Material:
 
     @classmethod
     def from_file(cls, path: str | Path) -> Material:
-        """Read the material of a .toml file: fields of this class, or all arguments of `from_lame`.
+        """Read the material of a .toml file: fields of this class, others keep their defaults.
 
-        Fields that are left out keep their defaults. Raises ValueError that names the file.
+        Raises ValueError that names the file.
         """
         try:
-            values = read_toml(path)
-            make = cls.from_lame if "lame_mu_pa" in values else cls
-            return make(**values)
+            return cls(**read_toml(path))
         except FileNotFoundError:
             raise ValueError(f"{path}: no such file") from None
         except (OSError, ValueError, TypeError) as error:  # also of text that is none
             reason = " ".join(str(error).split())
             raise ValueError(f"{path}: {reason}; give fields of Material in SI units") from None
-
-    @classmethod
-    def from_lame(
-        cls,
-        *,
-        lame_lambda_pa: float,
-        lame_mu_pa: float,
-        thickness: float,
-        areal_density: float,
-        bending_stiffness: float,
-    ) -> Material:
-        """Return the material from the numbers that SNUG's code and the methods after it give.
-
-        lame_lambda_pa and lame_mu_pa [Pa] are those of plane stress, 44,400 and 23,600 there; times the
-        thickness they are the membrane constants `lame_lambda` and `lame_mu` [N/m] of a material.
-        areal_density [kg/m^2] is 0.20022 there.
-
-        nu = lambda / (lambda + 2 mu), E = 2 mu (1 + nu).
-        """
-        if not (thickness > 0 and lame_lambda_pa + 2 * lame_mu_pa > 0):
-            raise ValueError("thickness and lambda + 2 mu must be above 0")
-        poisson_ratio = lame_lambda_pa / (lame_lambda_pa + 2 * lame_mu_pa)
-        return cls(
-            young_modulus=2 * lame_mu_pa * (1 + poisson_ratio),
-            poisson_ratio=poisson_ratio,
-            thickness=thickness,
-            density=areal_density / thickness,
-            bending_stiffness=bending_stiffness,
-        )
 
     @property
     def lame_mu(self) -> float:
