@@ -6,6 +6,7 @@ The solver knows a body as nothing more than this.
 from __future__ import annotations
 
 import copy
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -23,6 +24,7 @@ from reference_sim.geometry.surface import (
 from reference_sim.geometry.topology import check_closed
 
 DEFAULT_REGION = 0.20  # [m]
+BESIDE = 0.05  # [m] from the surface: what is pinned there rides on it
 
 
 @dataclass(frozen=True)
@@ -171,8 +173,8 @@ class Obstacle:
         The plane goes through the closest allowed point of the surface; its normal points from there to
         the sample (from the sample, when that is inside), which makes n.(x - c) the signed distance at
         the sample's own position. Beyond the border of the allowed faces it fades: see
-        `surface.plane_normals`. With `margin` [m], as contact gives it, no plane beyond
-        TANGENT_BALL touches a sample that is outside the whole surface and farther from it than that.
+        `surface.plane_normals`. With `margin` [m] no plane farther than TANGENT_BALL touches a free
+        sample: one outside the whole surface, and farther from it than the margin.
 
         points (S, 3) [m]: samples. rest_points (S, 3) [m]: the samples at rest, for the rule of regions.
         """
@@ -184,24 +186,19 @@ class Obstacle:
             *self._around, normals,
         )  # fmt: skip
         if margin is not None:
-            self._turn_from_free(points, vertices, closest.points, closest.faces, normals, margin)
+            self._turn_from_free(points, vertices, closest, normals, margin)
         return Planes(closest.points, normals, closest.faces, closest.barycentric)
 
     def _turn_from_free(
         self,
         points: np.ndarray,
         vertices: np.ndarray,
-        closest: np.ndarray,
-        faces: np.ndarray,
+        closest: Closest,
         normals: np.ndarray,
         margin: float,
     ) -> None:
-        """Turn the normals (S, 3) of planes that touch points (S, 3) [m] which are free of the surface.
-
-        Free is what lies outside the whole surface, farther away than `margin` [m]. Only samples more
-        than TANGENT_BALL from their closest allowed faces, below or beside them, are searched.
-        """
-        offsets = points - closest
+        """Turn the normals (S, 3) of planes that touch free points (S, 3) [m]; see `planes`."""
+        offsets = points - closest.points
         distances = np.linalg.norm(offsets, axis=1)
         heights = np.einsum("si,si->s", normals, offsets)
         # Tilted planes too, which would be met within the step.
@@ -210,11 +207,8 @@ class Obstacle:
             return
         assert self._search is not None
         some = points[doubtful]
-        nearest = self._search.nearest(some, hints=faces[doubtful]).points
-        nearest_distances, away = np.linalg.norm(some - nearest, axis=1), distances[doubtful]
-        # Straight below the closest face of all is inside.
-        unsure = (nearest_distances < 0.999999 * away) | (np.abs(heights[doubtful]) < 0.99 * away)
-        free = (nearest_distances > margin) & unsure
+        nearest = self._search.nearest(some, hints=closest.faces[doubtful]).points
+        free = np.linalg.norm(some - nearest, axis=1) > margin
         free[free] = winding_numbers(vertices, self.faces, some[free]) <= 0
         turned = doubtful[free]
         normals[turned] = offsets[turned] / distances[turned, None]
@@ -222,21 +216,40 @@ class Obstacle:
     def transported(
         self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None
     ) -> np.ndarray:
-        """Return points (N, 3) [m] of frame - 1 moved along with the body, each beside its nearest face.
+        """Return points (N, 3) [m] of frame - 1 moved along with the body; at frame 0 nothing has moved.
 
-        The best known initial guess for a garment. At frame 0 nothing has moved. Points that are all
-        farther away than DEFAULT_REGION stay: carried on so long a lever, cloth would be torn.
+        The best known initial guess for a garment.
         """
-        before = max(frame - 1, 0)
-        closest = self._nearest(points, before, rest_points)
+        return self.carrying(points, max(frame - 1, 0), rest_points)(frame)
+
+    def carrying(
+        self, points: np.ndarray, start: int = 0, rest_points: np.ndarray | None = None
+    ) -> Callable[[int], np.ndarray]:
+        """Return the function of the frame that moves points (N, 3) [m] of frame `start` along.
+
+        Each stays beside its nearest face, as a pin that rides: `simulate(...,
+        pin_positions=body.carrying(x[cloth.pins]))`. Points that are all farther away than DEFAULT_REGION
+        stay where they are: carried on so long a lever, cloth would be torn.
+        """
+        closest = self._nearest(points, start, rest_points)
+        before = self.at(start)
         if np.linalg.norm(points - closest.points, axis=1).min(initial=np.inf) > DEFAULT_REGION:
-            return points.copy()
-        carried = np.empty_like(closest.points)
-        carry(
-            points, closest.points, closest.faces, closest.barycentric, self.at(before), self.at(frame),
-            self.faces, carried,
-        )  # fmt: skip
+            return lambda frame: points.copy()
+
+        def carried(frame: int) -> np.ndarray:
+            moved = np.empty_like(closest.points)
+            carry(
+                points, closest.points, closest.faces, closest.barycentric, before, self.at(frame),
+                self.faces, moved,
+            )  # fmt: skip
+            return moved
+
         return carried
+
+    def beside(self, points: np.ndarray) -> bool:
+        """Return whether most of the points (N, 3) [m] are within BESIDE of the surface in frame 0."""
+        gaps = np.linalg.norm(points - self._nearest(points, 0).points, axis=1)
+        return bool(np.median(gaps) <= BESIDE)
 
     def signed_distance(self, points: np.ndarray, frame: int) -> np.ndarray:
         """Return the distance of points (N, 3) to the surface [m], negative where it winds around a point."""

@@ -45,7 +45,8 @@ def make_parser() -> argparse.ArgumentParser:
     add("-o", "--out", type=Path, required=True, metavar="OUT.vtkhdf", help="trajectory")
     add("--units", choices=("m", "cm", "mm", "in"), default="m", help="of all meshes (default m)")
     add("--up", choices=("y", "z"), default="y", help="up axis of all meshes (default y)")
-    add("--pins", metavar="WHICH", help="vertices held in place: '0,9,12', or 'top'")
+    add("--pins", metavar="WHICH", help="vertices that are held, or ride on a moving obstacle beside them: "
+        "'0,9,12', or 'top'")  # fmt: skip
     add("--material", type=Path, metavar="FILE",
         help=".toml: young_modulus [Pa], poisson_ratio, thickness [m], density [kg/m^3], "
         "bending_stiffness [J] (default: the cotton of the SNUG paper)",
@@ -80,7 +81,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     frames = options.frames
     if frames is None:
         frames = obstacle.frames if obstacle is not None and obstacle.frames > 1 else FRAMES_ALONE
-    motion = simulate(cloth, terms, dt=options.dt, frames=frames, obstacle=obstacle, progress=path.name)
+    rides = None
+    pins = cloth.rest_positions[cloth.pins]
+    if len(pins) and obstacle is not None and obstacle.frames > 1 and obstacle.beside(pins):
+        rides = obstacle.carrying(pins)
+    motion = simulate(
+        cloth, terms, dt=options.dt, frames=frames, obstacle=obstacle, pin_positions=rides,
+        progress=path.name,
+    )  # fmt: skip
     motion.save(path)
     fields = motion.frame_fields
     last = [
@@ -89,6 +97,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     print(
         f"frames     {motion.frames} of {frames}, {int(fields['converged'].sum())} converged\n"
         f"status     {motion.status}{motion.reason and ': '}{motion.reason}\n"
+        f"pins       {len(pins)} {'ride on the obstacle' if rides else 'stay in place'}\n"
         f"energies   {', '.join(last)} J at the last frame\nwrote      {path}"
     )
     return 0 if motion.frames == frames and motion.status == "converged" else 1

@@ -104,13 +104,6 @@ class TimeStepper:
         """Let the next run give the bits of a first one: minimisers forget what they have learned."""
         self.minimiser.start_again()
 
-    def check_start(self, x: np.ndarray, v: np.ndarray) -> None:
-        """Raise ValueError where x (V, 3) [m] at frame 0 is impossible for a term that nothing may pass."""
-        if any(energy.joins_late for energy in self.potential.energies):
-            self.prepare(1, x, v, x[self.cloth.pins])
-            if infeasibility := self.potential.infeasibility(x):
-                raise ValueError(f"simulate: the start is not free of intersections: {infeasibility}")
-
     def advance(
         self, frame: int, state: State, pins: np.ndarray | None
     ) -> tuple[State | None, list[Result]]:
@@ -138,12 +131,8 @@ class TimeStepper:
             y = results[-1].positions
             if results[-1].status == "diverged" or not np.isfinite(y).all():
                 return None, results
-            x, v = y, self.velocity(y, x)
+            x, v = y, np.zeros_like(y) if self.quasi_static else (y - x) / self.dt
         return State(x, v), results
-
-    def velocity(self, x: np.ndarray, before: np.ndarray) -> np.ndarray:
-        """Return the velocity (V, 3) [m/s] that a step from `before` to x (V, 3) [m] ends with."""
-        return np.zeros_like(x) if self.quasi_static else (x - before) / self.dt
 
     def prepare(self, step: int, x: np.ndarray, v: np.ndarray, handles: np.ndarray) -> np.ndarray:
         """Freeze every term for the step from x with velocity v (V, 3); return its first guess (V, 3) [m].
@@ -181,9 +170,22 @@ class TimeStepper:
             raise ValueError(f"simulate: frames = {frames}: must be at least 1")
         rest = self.cloth.rest_positions
         x = _finite(rest if start is None else start, rest.shape, "start")
+        pins = x[self.cloth.pins]
+        body = self.obstacle
+        if pin_positions is None and len(pins) and body and body.beside(pins) and body.frames > 1:
+            raise ValueError(
+                f"simulate: the obstacle beside {len(pins)} pins moves: give pin_positions, as "
+                "obstacle.carrying(pins) that lets them ride on it, or lambda frame: pins"
+            )
         v = _finite(np.zeros_like(rest) if velocity is None else velocity, rest.shape, "velocity")
         provenance = self.provenance()
-        self.check_start(x, v)
+        if any(energy.joins_late for energy in self.potential.energies):
+            self.prepare(1, x, v, pins)
+            if infeasibility := self.potential.infeasibility(x):
+                raise ValueError(
+                    f"simulate: the start is not free of intersections: {infeasibility}: mend the mesh "
+                    "there, or simulate without self-contact"
+                )
         state, status, reason = State(x, v), "converged", ""
         positions, seconds, fields = [x], [0.0], [_fields_of_start(self.potential.energies)]
         numbers: Iterable[int] = range(1, frames)
@@ -261,7 +263,7 @@ def simulate(
         obstacle: the moving body, one mesh per frame.
         start: (V, 3) [m] at frame 0; default the rest positions.
         velocity: (V, 3) [m/s] at frame 0; default zero.
-        pin_positions: frame -> (P, 3) [m], for handles that move.
+        pin_positions: frame -> (P, 3) [m], for handles that move; see `Obstacle.carrying`.
         progress: label of a progress bar with time left; None for silence.
         options: of a `time_loop.TimeStepper` and its minimiser: guess, substeps, quasi_static, refreeze,
             method, tolerance, max_iterations, timeout, ...
@@ -272,7 +274,8 @@ def simulate(
         within the tolerance up to round-off alone; the reason tells of the first), energy/<term> [J].
 
     Raises:
-        ValueError: wrong shapes (of a guess too), fewer than 1 frame, what a `TimeStepper` refuses.
+        ValueError: wrong shapes (of a guess too), fewer than 1 frame, what a `TimeStepper` refuses, pins
+            beside a moving obstacle without pin_positions.
 
     Example: a triangle that one corner holds falls by g dt^2 in the first step.
 
@@ -295,9 +298,7 @@ def simulate(
 def _worst(status: str, reason: str, frame: int, results: Sequence[Result]) -> tuple[str, str]:
     """Return status and reason of a run after the minimisations on the way to `frame`.
 
-    The worst counts, and of equally bad ones the first: a solver that is stopped early gives up in frame
-    1, which must not hide a later divergence. Until one did not converge, the reason is that of the first
-    that converged within round-off alone.
+    The worst counts, the first of equally bad ones; else the first that round-off excused has the reason.
     """
     for result in results:
         if STATUSES[result.status] > STATUSES[status] or (result.relaxed and not reason):

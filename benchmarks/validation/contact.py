@@ -82,7 +82,6 @@ class RoundBody:
     coordinates of a point in the frame that turns.
     """
 
-    fingerprint = "round"
     faces = np.array([[0, 1, 2]])
 
     def __init__(
@@ -97,6 +96,10 @@ class RoundBody:
         """Return the turned unit vectors of a frame, (3, 3)."""
         c, s = np.cos(frame * self.turn), np.sin(frame * self.turn)
         return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
+
+    def beside(self, points: np.ndarray) -> bool:
+        """Return that no pins ride on it: ends of a strip are held while the drum turns below."""
+        return False
 
     def planes(
         self,

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from reference_sim import Obstacle
+from reference_sim import Cloth, Obstacle, simulate
+from reference_sim.energies import Gravity
 from tests.reference_sim.meshes import random_rotation, sphere
 
 RADIUS = 0.3
@@ -126,4 +127,16 @@ def test_carried_is_exact_for_a_rigid_motion():
     obstacle = Obstacle(np.stack([SPHERE, SPHERE @ turn.T + shift]), FACES)
     points, _ = around(200, 6, -0.1, 0.3)
     # Round-off of barycentric places and frames, at 1 m from the origin.
-    assert obstacle.transported(points, 1) == pytest.approx(points @ turn.T + shift, abs=1e-12)
+    for carried in (obstacle.transported(points, 1), obstacle.carrying(points)(1)):
+        assert carried == pytest.approx(points @ turn.T + shift, abs=1e-12)
+
+
+def test_pins_beside_an_obstacle_that_moves_are_not_left_behind_without_a_word():
+    walking = Obstacle(SPHERE + np.array([0.03, 0.0, 0.0]) * np.arange(3)[:, None, None], FACES)
+    beside, off = np.array([[0.0, 0.34, 0.0]]), np.array([[0.0, 0.36, 0.0]])
+    triangle = np.array([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.0, 0.0, 0.1]])
+    cloths = [Cloth(triangle + place, np.array([[0, 2, 1]]), pins=[0]) for place in (beside, off)]
+    with pytest.raises(ValueError, match=r"1 pins moves: give pin_positions, as obstacle.carrying"):
+        simulate(cloths[0], [Gravity(cloths[0])], obstacle=walking)
+    for cloth, obstacle in ((cloths[1], walking), (cloths[0], Obstacle(SPHERE, FACES))):
+        assert simulate(cloth, [Gravity(cloth)], obstacle=obstacle, frames=2).status == "converged"

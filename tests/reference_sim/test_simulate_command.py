@@ -59,6 +59,14 @@ def test_a_pinned_sheet_in_other_units_and_axes_is_the_same(simulate):
     assert (metres[-1, [0, 6]] == metres[0, [0, 6]]).all() and metres[-1, :, 1].min() < -0.01
 
 
+def test_pins_ride_on_an_obstacle_that_moves_below_them_and_stay_elsewhere(simulate, capsys):
+    for pins, moved, said in (("24", 0.02, "1 ride on the obstacle"), ("0,6", 0.0, "2 stay in place")):
+        assert simulate(f"sheet.obj --pins {pins} --obstacle ball -o at{pins}.vtkhdf") == 0
+        x = Trajectory.load(f"at{pins}.vtkhdf").positions[:, [int(pin) for pin in pins.split(",")]]
+        np.testing.assert_allclose(x[-1] - x[0], np.tile([moved, 0, 0], (x.shape[1], 1)), atol=1e-12)
+        assert f"pins       {said}" in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
