@@ -23,6 +23,7 @@ from reference_sim.energies.stretch_stvk import StretchStVK
 from reference_sim.obstacle import Obstacle
 from reference_sim.time_loop import simulate
 from reference_sim.trajectory import Trajectory
+from snug.garments.garment import piece_of_faces
 from snug.garments.templates import find_template
 from snug.motion.library import make_motion
 from snug.motion.motion import transition
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from benchmarks.presets import Dependence
     from snug.body.parametric_body import Body
 
+FALLEN = 0.3  # [m] from where the body carries it: a piece has fallen off whose vertices are all as far
 HOLD = 0.5  # frames of stillness after the limbs have arrived, as a share of those of the approach
 DISTANCE, STIFFNESS = 1e-3, 100.0  # of self-contact: [m], two thicknesses of the cloth; [Pa]
 SHORT = 0.25  # share of a motion's frames that is left out at most
@@ -123,8 +125,8 @@ def with_self_contact(energies: tuple[Energy, ...]) -> tuple[Energy, ...]:
 def settled(cloth: Cloth, energies: tuple[Energy, ...], dressed: Dressed, frames: int) -> np.ndarray:
     """Simulate the cloth to rest on the body in the motion's first pose: positions (V,3) [m].
 
-    Raises RuntimeError when the simulation of the approach did not stay finite, and ValueError for a
-    garment that crosses itself where it may not.
+    Raises RuntimeError when the simulation of the approach did not stay finite, or a piece of the garment
+    fell off, and ValueError for a garment that crosses itself where it may not.
     """
     body, garment, motion, betas = dressed.body, dressed.garment, dressed.motion, dressed.betas
     first = motion.poses[0]
@@ -136,14 +138,19 @@ def settled(cloth: Cloth, energies: tuple[Energy, ...], dressed: Dressed, frames
     # The garment, unposed on that body, goes where the root takes a body in T-pose: a rigid motion.
     root = body.transforms(t_pose[None], translations[:1], betas)[0, 0]
     start = garment.rest_for(body, betas) @ root[:, :3].T + root[:, 3]
-    for barrier in (term for term in energies if term.joins_late):
-        if place := barrier.infeasibility(start):
-            raise ValueError(
-                f"garment {garment.name}: {place} where it starts: self-contact cannot untangle it; mend the "
-                "mesh at this face, or simulate without self-contact"
-            )
     way = replace(dressed, motion=replace(motion, poses=poses, translations=translations))
-    return _simulated(cloth, energies, way, start, "come to rest in the first pose")[-1]
+    x = _simulated(cloth, energies, way, start, "come to rest in the first pose")[-1]
+    whole = replace(garment, pins=np.arange(len(x)))
+    worn = whole.pin_positions(body, first[None], translations[:1], betas)[0]
+    off = np.linalg.norm(x - worn, axis=1)
+    pieces = piece_of_faces(cloth.faces)
+    gap = max(off[cloth.faces[pieces == piece]].min() for piece in range(pieces.max() + 1))
+    if gap > FALLEN:
+        raise RuntimeError(
+            f"garment {garment.name} fell off while it settled for {motion.name}: a piece ended "
+            f"{gap:.1f} m from its place; shoulders or a waistband hold a piece"
+        )
+    return x
 
 
 def _simulated(

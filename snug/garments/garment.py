@@ -214,6 +214,28 @@ def name_openings(body: Body, positions: Array, faces: Index) -> dict[str, Index
     return named | {f"opening_{count}": loops[number] for count, number in enumerate(rest, start=1)}
 
 
+def waist_pins(body: Body, positions: Array, faces: Index) -> Index:
+    """Return the pins (P,) of a garment (V,3) [m], (F,3): waists of pieces without neck and sleeves.
+
+    Contact without friction does not hold these. Raises GarmentError where nothing does.
+    """
+    pins = [np.empty(0, dtype=np.int64)]
+    pieces = piece_of_faces(faces)
+    for piece in (faces[pieces == number] for number in range(pieces.max() + 1)):
+        loops = name_openings(body, positions, piece)
+        if loops.keys() & {"neck", "left_sleeve", "right_sleeve"}:
+            continue
+        pins.append(loops.get("waist", pins[0]))
+        above = positions[piece, 1].max() >= joint_position(body, "left_shoulder")[1]
+        if not (len(pins[-1]) or above or loops.keys() & {"left_armhole", "right_armhole"}):
+            place = ", ".join(f"{x:.2f}" for x in positions[piece].mean(axis=(0, 1)))
+            raise GarmentError(
+                f"nothing holds its piece at ({place}) m: it ends below the shoulders, with no waist among "
+                f"its openings ({', '.join(loops)}): join it, or cut it open where the body comes out above"
+            )
+    return np.sort(np.concatenate(pins))
+
+
 def _name_beside(body: Body, centre: Array) -> str:
     """Return the name of the sleeve or leg that ends there, or empty in the middle."""
     hip, shoulder = joint_position(body, "left_hip"), joint_position(body, "left_shoulder")

@@ -31,8 +31,9 @@ from snug.garments.garment import (
     find_weights,
     name_openings,
     piece_of_faces,
+    waist_pins,
 )
-from snug.garments.implicit_surface import joint_position, skin_following
+from snug.garments.implicit_surface import skin_following
 
 TRAPPED_DEPTH = 0.02  # [m] below the skin, from which contact may not find the way out
 TRAPPED_SHARE = 0.05  # of the vertices that may be so deep
@@ -97,16 +98,6 @@ def _make_garment(file: GarmentFile, body: Body, raw: Surface, material: Materia
         raise ValueError("it has no opening, the surface is closed: cut where head and limbs come out")
     legs = "left_leg" in loops or "right_leg" in loops
     weights, nearest = find_weights(body, positions, faces, legs=legs)
-    # Without neck and sleeves it hangs from its waist, and contact without friction does not hold it.
-    pins = np.empty(0, dtype=np.int64)
-    if not loops.keys() & {"neck", "left_sleeve", "right_sleeve"}:
-        pins = np.sort(loops.get("waist", pins))
-        above = positions[:, 1].max() >= joint_position(body, "left_shoulder")[1]
-        if not (len(pins) or above or loops.keys() & {"left_armhole", "right_armhole"}):
-            raise ValueError(
-                f"nothing holds it: it ends below the shoulders, with no waist among its openings "
-                f"({', '.join(loops)}): cut it open where the body comes out above"
-            )
     return Garment(
         name=file.name,
         rest_positions=positions,
@@ -114,7 +105,7 @@ def _make_garment(file: GarmentFile, body: Body, raw: Surface, material: Materia
         body_vertices=nearest,
         skinning_weights=weights,
         loops=loops,
-        pins=pins,
+        pins=waist_pins(body, positions, faces),
         material=material,
         rest_uv=chart,
     )

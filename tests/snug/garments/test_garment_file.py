@@ -115,6 +115,14 @@ def test_legs_apart_are_no_sleeves_and_what_has_no_waist_does_not_hang(tmp_path,
         read_garment(path, body)
 
 
+def test_each_piece_of_an_outfit_is_held_by_itself(tmp_path, body, shirt):
+    skirt, count = tailored("skirt", 300), len(shirt.rest_positions)
+    both = np.concatenate([shirt.rest_positions, skirt.rest_positions])
+    faces = np.concatenate([shirt.faces, skirt.faces + count])
+    read = read_garment(saved(tmp_path, shirt, positions=both, faces=faces), body)
+    np.testing.assert_array_equal(read.pins, skirt.pins + count)
+
+
 def test_its_material_is_that_of_simulator_and_training(tmp_path, body, tube):
     (tmp_path / "silk.toml").write_text("young_modulus = 5e4\nbending_stiffness = 1e-6\n")
     file = GarmentFile(path=saved(tmp_path, tube), material=tmp_path / "silk.toml")
@@ -140,7 +148,7 @@ def moved(garment, change):
             "mm deep in the body.*: move it onto",
         ),
         (lambda s: moved(s, lambda x: np.add(x, (0, 0, 0.5))), "mm from the body.*: move it onto"),
-        (lambda s: {"faces": np.concatenate([s.faces, s.faces[5:6]])}, "a cloth is manifold"),
+        (lambda s: {"faces": np.concatenate([s.faces, s.faces[5:6]])}, "a surface is manifold"),
     ],
 )
 def test_what_cannot_be_worn_is_refused_with_its_remedy(tmp_path, body, shirt, spoil, words):
