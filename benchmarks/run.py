@@ -62,7 +62,7 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, repo
         print(absent, file=sys.stderr)
     for name, text in plan.cut_motions.items():
         print(f"motion {name}: {text} are measured; --set sizes.frames=N measures more", file=sys.stderr)
-    from benchmarks.runner.execute_plan import check_roll_outs, describe, execute, held
+    from benchmarks.runner.execute_plan import check_methods, describe, execute, held
 
     try:
         if dry_run:
@@ -78,7 +78,7 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, repo
         announce_compilation()
         dressed = bool(plan.scenes) and all(scene.dressed for scene in plan.scenes)
         start_loading(*(LOADED_BY_DRESSED if dressed else ()))
-        assets = check_roll_outs(plan)
+        assets = check_methods(plan)
         with held(plan.folder):
             return execute(plan, assets, report=report)
     except (RunRefused, DeclarationError, RollOutFileError) as error:

@@ -162,10 +162,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     with tempfile.TemporaryDirectory(prefix="entry-") as folder:
         plan = entry.plan(Path(folder) / "run")
         if options.action == "check":
-            from benchmarks.runner.execute_plan import check_roll_outs
+            from benchmarks.runner.execute_plan import check_methods
 
             check_scores(entry)
-            check_roll_outs(plan)
+            check_methods(plan)
             print(f"{entry.path}: nothing found; {len(entry.scenes)} of {len(SCENES)} scenes")
             return 0
         with contextlib.redirect_stdout(sys.stderr):

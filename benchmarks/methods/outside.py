@@ -9,6 +9,7 @@ from __future__ import annotations
 import glob
 import os
 import shlex
+import shutil
 import subprocess
 import tempfile
 from dataclasses import dataclass, field, replace
@@ -150,8 +151,11 @@ class Program(Stored):
     seed: int = 0
 
     def prepare(self, scene: BuiltScene) -> None:
-        """Remember the scene: the program's own start is no work of the method."""
+        """Remember the scene: to start the program is work of run(). Raises RuntimeError without it."""
         self.scene = scene
+        word = shlex.split(self.command)[0]
+        if shutil.which(word) is None:
+            raise RuntimeError(f"the program cannot be started: no {word} is here")
 
     def run(self) -> Trajectory:
         """Return what the program writes, in a folder that is gone afterwards.

@@ -7,11 +7,13 @@ import os
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NoReturn
 
-from benchmarks.external.roll_out_files import MODULE, RollOutFileError
+from benchmarks.external.roll_out_files import MODULE as STORED
+from benchmarks.external.roll_out_files import RollOutFileError
 from benchmarks.plan.plan import Plan, runs
 from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder
@@ -81,20 +83,39 @@ def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) ->
     return 0 if answer is not None and not failures else 1
 
 
-def check_roll_outs(plan: Plan) -> Assets | None:
-    """Compare every stored roll-out with its scene before anything is written; return the assets made for it.
+class NotSettled(Exception):
+    """A method asks for a start that is not simulated yet: so far it could be prepared."""
 
-    Raises RollOutFileError.
+
+def _refuse_start() -> NoReturn:
+    raise NotSettled
+
+
+def check_methods(plan: Plan) -> Assets | None:
+    """Prepare stored roll-outs and a user's methods before anything is written; return the assets for it.
+
+    Each roll-out has to fit its scene, and a method to be prepared for its first, up to where it asks for
+    the start. Methods are not asked whose network is still to be trained.
+
+    Raises RollOutFileError, and RunRefused with what a method says.
     """
-    stored = [cell for cell in plan.cells if cell.entry.module == MODULE]
-    if not stored:
-        return None
+    cells = [cell for cell in plan.cells if runs(cell)]
+    users = (cell for cell in reversed(cells) if cell.entry.declared_in and not cell.entry.trained)
+    checked = [cell for cell in cells if cell.entry.module == STORED]
+    checked += {cell.method: cell for cell in users}.values()
     assets = None
     try:
-        assets = plan.open_assets() if plan.garments else None
-        for cell in stored:
-            cell.entry.make(models=plan.folder, seed=0).prepare(cell.scene.build(assets))
-    except RollOutFileError:
+        assets = plan.open_assets() if plan.garments and checked else None
+        for cell in checked:
+            scene = replace(cell.scene.build(assets), settle=_refuse_start)
+            try:
+                with suppress(NotSettled):
+                    cell.entry.make(models=plan.folder, seed=cell.seed).prepare(scene)
+            except RollOutFileError:
+                raise
+            except Exception as error:  # whatever a user's code raises
+                raise RunRefused(f"{cell.label}: cannot be prepared: {one_line(error)}") from None
+    except (RollOutFileError, RunRefused):
         raise
     except ValueError:
         pass  # of what cannot be made or built the run says so itself, for all methods

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks import run
-from tests.benchmarks.plan.outside_files import METRIC_FILE, SCENE_FILE, as_before
+from tests.benchmarks.plan.outside_files import METHOD, METRIC_FILE, SCENE_FILE, as_before
 
 _as_before = pytest.fixture(autouse=True)(as_before)
 
@@ -72,6 +72,10 @@ METHOD_FILES = [
     (entry(PLAIN + ', role="solvr"'), "unknown role 'solvr'; use one of reference, "),
     (entry('name="a b", description="c"'), "method 'a b': name it by at most 150 letters"),
     (entry('name="snug", description="c"'), "method 'snug' is declared twice, by the project itself and by "),
+    (METHOD.replace("self.scene, _ =", "raise ValueError('other mesh') #"),
+     "free_fall x still: cannot be prepared: ValueError: other mesh"),
+    ("from benchmarks.methods.outside import program\nMETHODS = (program('p', 'gone {scene} {out}'),)",
+     "free_fall x p: cannot be prepared: RuntimeError: the program cannot be started: no gone is here"),
     (HEAD + "METHODS = tuple(MethodEntry(name=n, description='b') for n in ('a/b', 'a-b'))\n" + MAKE,
      "free_fall x a-b and free_fall x a/b would have the same files: rename one"),
 ]  # fmt: skip
