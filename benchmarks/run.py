@@ -55,7 +55,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, report: bool = True) -> int:
     """Run the plan, or print what would be run; return the exit status. report: whether to make one."""
-    print(plan.study.question, file=sys.stderr)
     for motion in plan.inputs.motions.values():
         print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
     if absent := plan.study.motion_files.absent(plan.inputs.motions):
@@ -79,6 +78,7 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, repo
         dressed = bool(plan.scenes) and all(scene.dressed for scene in plan.scenes)
         start_loading(*(LOADED_BY_DRESSED if dressed else ()))
         assets = check_methods(plan)
+        print(plan.study.question, file=sys.stderr)
         with held(plan.folder):
             return execute(plan, assets, report=report)
     except (RunRefused, DeclarationError, RollOutFileError) as error:
