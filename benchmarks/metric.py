@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
+from concurrent.futures import Future
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple, TypeVar
 
@@ -153,7 +154,12 @@ class Kept:
         """Return make(self), computed at the first call."""
         if make not in self._made:
             self._made[make] = make(self)
-        return self._made[make]
+        made = self._made[make]
+        return made.result() if isinstance(made, Future) else made
+
+    def keep(self, make: Callable[[Any], Made], made: Future[Made]) -> None:
+        """Take what another process computes in place of make(self)."""
+        self._made[make] = made
 
 
 @dataclass(eq=False)

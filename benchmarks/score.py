@@ -1,48 +1,42 @@
 """python -m benchmarks.score: evaluate a roll-out of another program in a scene of this project.
 
-A thin command: the roll-out is a method of an ordinary run, beside the simulation of the same scene.
+It stands beside the scene's reference: shipped, from a file, or simulated now.
 """
 
 from __future__ import annotations
 
-import contextlib
-import io
-import json
 import shlex
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 from benchmarks.external.roll_out_files import RollOutFileError, RollOutOption, parse_roll_out
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.options import add_study_options, study_of
 from benchmarks.plan.plan import Plan, make_plan
 from benchmarks.plan.study import Study, StudyError, option, read_study
-from benchmarks.results.run_folder import RunFolder
-from benchmarks.run import carry_out
 from benchmarks.timing import one_thread
-from reference_sim.command_line import INTERRUPTED, Parser, command
+from reference_sim.command_line import Parser, command
+
+if TYPE_CHECKING:
+    from benchmarks.runner.run_json import RunLog
 
 PROGRAM = "benchmarks.score"
 MEASURED_BESIDE = ("simulation", "skinning")  # relative excess is the share of skinning's
+NETWORKS = ("snug", "pbns")  # beside these where their numbers are shipped
 SOLVED_AGAIN = "speed"  # the part in which steps are solved again: gaps and one-step errors
 NO_REFERENCE = (
     "left out by --no-reference: distances of curvature and position, dynamics, relative energy gap"
 )
-SUMMARY_METRICS = (
-    "energy/total", "energy/strain", "energy/bending", "energy/bending_printed", "gap/energy",
-    "curvature/mean", "curvature/histogram", "penetration/surface", "distance/rms", "surface/chamfer",
-    "surface/normals",
-)  # fmt: skip
 EXAMPLES = """examples:
   python -m benchmarks.export tshirt/kick -o kick                 the scene, to be simulated elsewhere
-  python -m benchmarks.score mine.npz --scene tshirt/kick -o scored
+  python -m benchmarks.score mine.npz --scene tshirt/07_02            seconds: its reference is shipped
+  python -m benchmarks.score mine.npz --scene tshirt/kick -o scored   minutes: the scene is simulated
   python -m benchmarks.score mine.pc2,units=cm,up=z --scene tshirt/kick
   python -m benchmarks.score theirs=frames/,ms=2.2 --scene hanging_sheet
   python -m benchmarks.score 'out/cloth_*.obj' --scene flag --reference simulated.vtkhdf
-  python -m benchmarks.score mine.npz --scene tshirt/kick --json > numbers.json
   python -m benchmarks.score pred.pkl --rest-mesh shirt.obj --no-reference      cloth and body of a pickle
 
 ROLLOUT: .vtkhdf of this project; .npz with positions (T,V,3), faces, fps, quasi_static; .pkl with pred,
@@ -51,6 +45,7 @@ ROLLOUT: .vtkhdf of this project; .npz with positions (T,V,3), faces, fps, quasi
   order. units=cm and up=z say what the file has instead of metres and y up; other-mesh compares surfaces
   alone, ms=2.2 says what a frame takes.
 
+DIR has results.csv, run.json, and for_your_paper.tex and .csv. Page and PDF: benchmarks.run --rollout.
 exit status: 0 scored; 1 something failed, a line says what; 2 the roll-out cannot be read or does not belong
   to the scene: one line says why and nothing is written; 130 interrupted."""
 
@@ -59,11 +54,10 @@ exit status: 0 scored; 1 something failed, a line says what; 2 the roll-out cann
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
     command_line = list(sys.argv[1:] if arguments is None else arguments)
-    one_thread()
     parser = Parser(
         prog=f"python -m {PROGRAM}",
         description="Energies, gap to the minimum of each step, curvature, depth, dynamics of "
-        "a roll-out of another program: rows, a report, one line.",
+        "a roll-out of another program: a table, beside simulation, skinning, SNUG and PBNS.",
         epilog=EXAMPLES,
     )
     add = parser.add_argument
@@ -76,66 +70,58 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add_study_options(parser)
     reference = parser.add_mutually_exclusive_group()
     reference.add_argument("--reference", metavar="FILE",
-        help="compare with this roll-out (metres, y up) instead of simulating the scene")  # fmt: skip
+        help="compare with this roll-out (metres, y up) instead of the simulation")  # fmt: skip
     reference.add_argument("--no-reference", dest="reference", action="store_false",
         help="leave out what needs a reference")  # fmt: skip
-    add("--json", action="store_true",
-        help="print all numbers of the roll-out as one JSON object in place of the line: no figures, page "
-        "and PDF, and no times and gaps of what it is compared with")  # fmt: skip
-    add("-o", "--out", metavar="DIR", help="folder of the run (default: a new one under reports/runs/)")
+    reference.add_argument("--fresh", action="store_true",
+        help="simulate the scene, also where its reference is shipped")  # fmt: skip
+    add("-o", "--out", metavar="DIR", help="folder of the rows (default: a new one under reports/runs/)")
     parser.set_defaults(reference=None)
     options = parser.parse_args(command_line)
-    plan = plan_score(
-        study_of(options), options.roll_out, options.scene or "",
-        rest_mesh=options.rest_mesh, reference=options.reference,
-        report=not options.json, folder=Path(options.out) if options.out else None,
+    scored = score(
+        options.roll_out, options.scene or "", study=study_of(options), rest_mesh=options.rest_mesh,
+        reference=options.reference, fresh=options.fresh,
+        folder=Path(options.out) if options.out else None,
         command_line=shlex.join(["python", "-m", PROGRAM, *command_line]),
     )  # fmt: skip
-    with contextlib.redirect_stdout(sys.stderr):
-        status = carry_out(plan, program=PROGRAM, report=not options.json)
-    if evaluated := numbers(plan, status):
-        print(json.dumps(evaluated, indent=1) if options.json else summary(evaluated))
-    return status
+    from reports.build import build_row
+
+    print(build_row(scored["folder"]))
+    print(f"{scored['name']}: {scored['reason'] or scored['status']}; {scored['folder']}")
+    return 0 if scored["status"] == "ok" else 1
 
 
 def score(
-    roll_out: str | Path, scene: str = "", *, study: Study | None = None, **more: Any
+    roll_out: str | Path, scene: str = "", *, study: Study | None = None, fresh: bool = False, **more: Any
 ) -> dict[str, Any]:
-    """Evaluate a roll-out in a scene and return its `numbers`, without figures, page and PDF.
+    """Evaluate a roll-out in a scene and return its `numbers`.
 
     Args:
         roll_out: a file, a folder or a pattern, as the command takes it.
         scene: its name, as "tshirt/kick".
         study: whose body, garment, motions and sizes the scene has; None: study full.
-        more: `rest_mesh`, `reference` and `folder` of `plan_score`.
+        fresh: whether a scene is simulated whose reference is shipped.
+        more: `rest_mesh`, `reference`, `folder` and `command_line` of `plan_score`.
 
     Raises:
-        ValueError: one line, where the roll-out cannot be read or does not belong to the scene, or where
-            the evaluation ended early.
-        KeyboardInterrupt: it was interrupted.
+        ValueError: one line, where the roll-out cannot be read or does not belong to the scene.
 
-    >>> score("mine.npz", "tshirt/kick")["metrics"]["energy/strain"]["value"]  # doctest: +SKIP
+    >>> score("mine.npz", "tshirt/07_02")["metrics"]["energy/strain"]["value"]  # doctest: +SKIP
     0.031
     """
     one_thread()
-    plan = plan_score(study or read_study(), str(roll_out), scene, report=False, **more)
-    message = io.StringIO()
-    with contextlib.redirect_stdout(sys.stderr), contextlib.redirect_stderr(message):
-        status = carry_out(plan, program=PROGRAM, report=False)
-    if status == INTERRUPTED:
-        raise KeyboardInterrupt
-    evaluated = numbers(plan, status)
-    if evaluated is None:
-        raise ValueError((message.getvalue().strip() or "the run ended early").splitlines()[-1])
-    return evaluated
+    plan = plan_score(study or read_study(), str(roll_out), scene, **more)
+    from benchmarks.evaluate import evaluate  # loads the simulator
+
+    return numbers(evaluate(plan, {} if fresh else None))
 
 
 def plan_score(
     study: Study, roll_out: str, scene: str = "", *, rest_mesh: str | Path | None = None,
-    reference: str | Path | Literal[False] | None = None, report: bool = True, folder: Path | None = None,
+    reference: str | Path | Literal[False] | None = None, folder: Path | None = None,
     command_line: str = "benchmarks.score.score",
 ) -> Plan:  # fmt: skip
-    """Return the plan of a roll-out, of the simulation and of skinning in one scene.
+    """Return the plan of a roll-out, and of what it is evaluated beside, in one scene.
 
     Args:
         study: whose body, garment, motions and sizes the scene has.
@@ -143,7 +129,6 @@ def plan_score(
         scene: its name; empty with a rest mesh.
         rest_mesh: of a roll-out that brings its own scene.
         reference: a roll-out in place of the simulation; False for none.
-        report: whether times and gaps of what the roll-out is compared with are measured.
         folder: of the run; None: a new one.
         command_line: for run.json.
     """
@@ -157,18 +142,19 @@ def plan_score(
 
         scenes = [declared(stored, str(rest_mesh))]
         scene = scenes[0].name
+    beside = MEASURED_BESIDE if rest_mesh else (*MEASURED_BESIDE, *NETWORKS)
     # Some have a scene's name.
     parts = {name: replace(part, cases=()) for name, part in study.parts.items()}
     plan = make_plan(
-        replace(study, parts=parts, scenes=(scene,), methods=MEASURED_BESIDE, rollouts={name: stored}),
+        replace(study, parts=parts, scenes=(scene,), methods=beside, rollouts={name: stored}),
         folder=folder, command=command_line, scenes=scenes,
     )  # fmt: skip
     if len(plan.scenes) != 1:
         raise StudyError(f"{scene}: name one scene; see python -m benchmarks.run --list")
     cells = []
     for cell in (_reference(cell, reference) for cell in plan.cells):
-        suites = (*cell.suites, SOLVED_AGAIN) if report or cell.method == name else cell.suites
-        entry = replace(cell.entry, timed=cell.entry.timed and report)
+        suites = (*cell.suites, SOLVED_AGAIN) if cell.method == name else cell.suites
+        entry = replace(cell.entry, timed=False)
         cells.append(replace(cell, entry=entry, suites=tuple(dict.fromkeys(suites))))
     return replace(plan, cells=tuple(cells))
 
@@ -188,37 +174,23 @@ def _reference(cell: Cell, given: str | Path | Literal[False] | None) -> Cell:
     return replace(cell, entry=replace(entry, label="Reference, from a file"))
 
 
-def numbers(plan: Plan, status: int) -> dict[str, Any] | None:
+def numbers(log: RunLog) -> dict[str, Any]:
     """Return name, scene, status ("ok", or the first other one), reason, metrics and folder of the roll-out.
 
-    Metrics are name -> value and unit. None where the run ended before the roll-out was evaluated.
+    Metrics are name -> value and unit.
     """
-    folder, name = RunFolder(plan.folder), plan.cells[-1].method
-    if status not in (0, 1) or not folder.rows_path.is_file():
-        return None
-    rows = [row for row in folder.read_rows() if row.method == name]
-    worst = next((row for row in rows if row.status != "ok"), rows[0] if rows else None)
-    if worst is None:
-        return None
+    cell = log.plan.cells[-1]
+    rows = [row for row in log.rows if row.method == cell.method]
+    worst = next((row for row in rows if row.status != "ok"), rows[0])
     known = (row for row in rows if row.value is not None)
     return {
-        "name": name,
-        "scene": plan.scenes[0].name,
+        "name": cell.method,
+        "scene": cell.scene.name,
         "status": worst.status,
         "reason": worst.reason if worst.status != "ok" else "",
         "metrics": {row.metric: {"value": row.value, "unit": row.unit} for row in known},
-        "folder": str(plan.folder),
+        "folder": str(log.folder.path),
     }
-
-
-def summary(evaluated: dict[str, Any]) -> str:
-    """Return one line of results, and where the rest is."""
-    folder, metrics = RunFolder(Path(evaluated["folder"])), evaluated["metrics"]
-    bad = [f"{evaluated['status']}: {evaluated['reason']}"] if evaluated["status"] != "ok" else []
-    shown = {name: metrics[name] for name in SUMMARY_METRICS if name in metrics}
-    values = [f"{name} {number['value']:.4g} {number['unit']}" for name, number in shown.items()]
-    where = folder.report_path if folder.report_path.is_file() else folder.path
-    return f"{evaluated['name']} in {evaluated['scene']}: {', '.join([*bad, *values])}; {where}"
 
 
 if __name__ == "__main__":

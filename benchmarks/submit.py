@@ -7,7 +7,6 @@ scored.
 
 from __future__ import annotations
 
-import contextlib
 import math
 import os
 import sys
@@ -24,7 +23,6 @@ from benchmarks.provenance import digest_of_file
 from benchmarks.results.protocol import DIGEST, NUMBER
 from benchmarks.results.row import USABLE
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.run import carry_out
 from benchmarks.score import MEASURED_BESIDE
 from benchmarks.timing import one_thread
 from reference_sim.command_line import Parser, command
@@ -40,7 +38,7 @@ KEPT = ("preset", "metrics", "methods", "scenes", "cases")  # of run.json
 EXAMPLES = """examples:
   python -m benchmarks.export tshirt/dance_turn -o dance            a scene, to be dressed elsewhere
   python -m benchmarks.submit check submissions/mine                seconds: metadata, files, protocol
-  python -m benchmarks.submit score submissions/mine                minutes: writes submissions/mine/scores
+  python -m benchmarks.submit score submissions/mine                a minute: writes submissions/mine/scores
   python -m reports.docs                                            writes the page of all entries
 
 DIR has entry.toml and one roll-out for each scene, or a program (docs/entries.md). Both check and score load
@@ -168,10 +166,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
             check_methods(plan)
             print(f"{entry.path}: nothing found; {len(entry.scenes)} of {len(SCENES)} scenes")
             return 0
-        with contextlib.redirect_stdout(sys.stderr):
-            if carry_out(plan, program=PROGRAM, report=False) not in (0, 1):
-                raise EntryError(f"{entry.path}: was not scored: a line above says why")
+        from benchmarks.evaluate import evaluate  # loads the simulator
+        from reports.build import build_row
+
+        evaluate(plan)
         count = write_scores(entry, RunFolder(plan.folder))
+        print(build_row(plan.folder))
     print(f"{entry.path}: {count} rows in {entry.scores.rows_path}")
     return 0
 

@@ -64,6 +64,17 @@ def build_report(run_dir: str | Path) -> Built:
     return Built(write_pdf(folder, report), [*run.problems, *run.warnings], answer(run, tables))
 
 
+def build_row(run_dir: str | Path) -> str:
+    """Write for_your_paper.csv and .tex alone; return their table as text."""
+    from reports.finished_run import read_run  # loads pandas
+    from reports.text.for_your_paper import write_paper_table
+    from reports.text.text_table import markdown_table, text_rows
+
+    folder = RunFolder(run_dir)
+    run = read_run(folder)
+    return markdown_table(text_rows(run, write_paper_table(folder, run)))
+
+
 @command("reports.build", goes_on="the same command begins again", bad_input=(ResultsError,))
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""

@@ -49,7 +49,7 @@ MEANS = ("gap/energy", "gap/local", "gap/refrozen", "step/distance", "step/curva
 def measure(roll_out: RollOut) -> dict[str, float | Estimate]:
     """Return gaps, one-step distances and the gradient left, of the sampled frames."""
     group = roll_out.group
-    scale, values = group.kept(gap_scale), roll_out.kept(_judge_steps).metrics()
+    scale, values = group.kept(gap_scale), roll_out.kept(judge_steps).metrics()
     if scale is None or not values:
         return values
     gap = values["gap/energy"]
@@ -61,14 +61,15 @@ def measure(roll_out: RollOut) -> dict[str, float | Estimate]:
 
 def series(roll_out: RollOut) -> dict[str, NDArray[np.float32]]:
     """Return step/vertices (T,V) [mm]: distance of each vertex to y_t; nan in other than sampled frames."""
-    away = roll_out.kept(_judge_steps).away
+    away = roll_out.kept(judge_steps).away
     shown = np.full(roll_out.positions.shape[:2], np.nan, dtype=np.float32)
     for frame, distances in away.items():
         shown[frame] = distances
     return {"step/vertices": shown} if away else {}
 
 
-def _judge_steps(roll_out: RollOut) -> Optimality:
+def judge_steps(roll_out: RollOut) -> Optimality:
+    """Solve the sampled steps of a roll-out again."""
     group = roll_out.group
     scale = group.kept(gap_scale)
     return optimality(roll_out.scene, roll_out.positions, samples=group.gap_samples, scale=scale)

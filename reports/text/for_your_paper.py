@@ -31,14 +31,15 @@ METRICS = (
 CITATION = "Neural garments versus a reference solver: a physics-validation benchmark"
 
 
-def write_paper_table(folder: RunFolder, run: Run) -> None:
-    """Write for_your_paper.csv, whose rows repeat the caption, and for_your_paper.tex."""
+def write_paper_table(folder: RunFolder, run: Run) -> Table:
+    """Write for_your_paper.csv, whose rows repeat the caption, and for_your_paper.tex; return the table."""
     table = paper_table(run)
     rows = tuple((*row, table.caption) for row in table.rows)
     columns = (*table.columns, Column("caption", "Caption", text=True))
     replace(table, columns=columns, rows=rows).write_csv(folder.path)
     with replacing(folder.path / f"{NAME}.tex") as temporary:
         temporary.write_text(latex_table(run, table), encoding="utf-8", newline="\n")
+    return table
 
 
 def paper_table(run: Run) -> Table:

@@ -1,0 +1,161 @@
+"""Evaluate a few methods in this process, beside references that are shipped or simulated now.
+
+The tasks are those of a run (benchmarks.runner) without its processes, cache, clock and report.
+"""
+
+from __future__ import annotations
+
+import shutil
+import sys
+from collections.abc import Iterator, Mapping
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import replace
+from multiprocessing import get_context
+from typing import Any
+
+import numpy as np
+
+from benchmarks.assets import Assets, embedded_motions, open_assets
+from benchmarks.external.roll_out_files import MODULE
+from benchmarks.metric import RollOut
+from benchmarks.metrics.energy_gap import judge_steps
+from benchmarks.plan.cell import Cell, TaskId, id_of
+from benchmarks.plan.plan import Plan, runs
+from benchmarks.references import TRAINED, Reference, find_reference, packaged_network
+from benchmarks.results.run_folder import RunFolder, model_path
+from benchmarks.runner.cells import prepared_method, run_cell
+from benchmarks.runner.ground_truth import simulate_quasi_static
+from benchmarks.runner.measurements import measure_cell, roll_outs_of
+from benchmarks.runner.rows import rows_of
+from benchmarks.runner.run_json import RunLog, now
+from benchmarks.runner.task import Context, Outcome
+from benchmarks.scene import Scene
+from reference_sim import Trajectory
+
+
+def evaluate(plan: Plan, references: Mapping[str, Reference] | None = None) -> RunLog:
+    """Run and measure the cells of a plan, and write run.json and results.csv into its folder.
+
+    Args:
+        plan: cells of SNUG and PBNS count only in scenes with a reference: they are the package's.
+        references: scene -> what takes the place of its simulation; None: those that are shipped.
+
+    Raises:
+        RollOutFileError: a roll-out that does not belong to its scene; then nothing is written.
+    """
+    assets, found = _assets(plan), dict(references or {})
+    folder = RunFolder(plan.folder)
+    contexts = {s.name: Context(folder, assets, {"scene": s.build(assets)}) for s in plan.scenes}
+    for scene in plan.scenes if references is None else ():
+        shipped = find_reference(scene, plan, contexts[scene.name].memo["scene"].cloth.faces)
+        if isinstance(shipped, Reference):
+            found[scene.name] = shipped
+        elif any(
+            c.entry.role == "reference" and c.entry.module != MODULE and runs(c) for c in plan.cells
+        ):
+            print(f"{scene.name}: {shipped}: it is simulated, which takes minutes", file=sys.stderr)
+    kept = (c for c in plan.cells if c.method not in TRAINED or c.scene.name in found)
+    plan = replace(plan, cells=tuple(kept))
+    for name, reference in found.items():
+        memo, start = contexts[name].memo, reference.positions[0]
+        memo["scene"] = replace(memo["scene"], settle=lambda start=start: start)
+    for cell in plan.cells:
+        if cell.entry.module == MODULE:
+            prepared_method(cell, contexts[cell.scene.name])
+    log, outcomes = RunLog(plan), dict[TaskId, Outcome]()
+    if assets:
+        log.open_assets(assets)
+    for scene in plan.scenes:
+        outcomes |= _of_scene(scene, plan, contexts[scene.name], found.get(scene.name))
+    log.config["finished"] = now()
+    origin = {id: {**log.origin, **outcome.origin} for id, outcome in outcomes.items()}
+    outcomes = {id: replace(outcome, origin=origin[id]) for id, outcome in outcomes.items()}
+    log.write_rows(rows_of(plan, (), outcomes))
+    return log
+
+
+def _assets(plan: Plan) -> Assets | None:
+    """Open body, garments and the motions of the scenes alone."""
+    read = plan.inputs.motions
+    names = dict.fromkeys(scene.motion for scene in plan.scenes if scene.dressed)
+    motions = [read[name] if name in read else embedded_motions([name])[0] for name in names]
+    return open_assets(plan.study.sizes, motions, plan.garments, inputs=plan.inputs) if names else None
+
+
+def _of_scene(
+    scene: Scene, plan: Plan, context: Context, reference: Reference | None
+) -> dict[TaskId, Outcome]:
+    """Return the outcomes of a scene's cells and of their metrics."""
+    cells = tuple(cell for cell in plan.cells if cell.scene == scene)
+    outcomes, measured = dict[TaskId, Outcome](), dict[TaskId, Outcome]()
+    known = reference.metrics if reference else {}
+    for cell in cells:
+        if (why := cell.entry.skip(scene)) is not None:
+            outcomes[cell.id()] = Outcome("skipped", why)
+        elif reference and cell.entry.role == "reference":
+            outcomes[cell.id()] = _saved(reference, cell, context)
+        elif cell.method not in known:
+            if cell.entry.trained in TRAINED:
+                models = context.folder.models_of(scene.garment)
+                models.mkdir(parents=True, exist_ok=True)
+                copy = model_path(models, cell.entry.trained, cell.seed)
+                shutil.copyfile(packaged_network(cell.entry.trained), copy)
+            outcomes[cell.id()] = run_cell(cell, 0.0, context, {})
+    simulated = any(cell.entry.role == "reference" and runs(cell) for cell in cells)
+    if scene.dynamic and simulated:
+        id = id_of("quasi-static", scene)
+        outcomes[id] = Outcome() if reference else simulate_quasi_static(scene, context, {})
+    context.memo["roll-outs"] = roll_outs_of(cells, plan.study.sizes.gap_samples, context, outcomes)
+    for cell in cells:
+        if cell.method in known:
+            origin = dict(reference.origin) if reference else {}
+            usual = Outcome(files=(cell.name,), result={"terms": "+".join(context.memo["scene"].terms)})
+            outcomes[cell.id()] = replace(outcomes.get(cell.id(), usual), origin=origin)
+            measured[cell.id("metrics")] = Outcome(result=known[cell.method])
+        elif outcomes[cell.id()].files:
+            with _steps_beside(context.memo["roll-outs"][cell]):
+                measured[cell.id("metrics")] = measure_cell(
+                    cell, cells, plan.study.sizes.gap_samples, plan.metrics, context, outcomes
+                )
+    return outcomes | measured
+
+
+def _saved(reference: Reference, cell: Cell, context: Context) -> Outcome:
+    """Write a reference into the folder of the run as if it had been simulated there."""
+    built, folder = context.memo["scene"], context.folder
+    still = np.full_like(reference.positions, np.nan)
+    still[:, built.dressed.garment.hem] = reference.hem
+    path = folder.trajectory_path(*cell.key)
+    path.parent.mkdir(parents=True, exist_ok=True)
+    times = np.arange(len(still)) * built.dt
+    for positions, to in (
+        (reference.positions, path),
+        (still, folder.quasi_static_path(cell.scene.name)),
+    ):
+        Trajectory(positions, built.cloth.faces, times, status="converged").save(to)
+    facts = {"terms": "+".join(built.terms)}
+    return Outcome(reference.status, reference.reason, result=facts, files=(folder.relative(path),))
+
+
+@contextmanager
+def _steps_beside(roll_out: RollOut) -> Iterator[None]:
+    """Solve the time steps of a roll-out again in another process, while this one measures all else."""
+    if "speed" not in roll_out.suites or sys.platform != "linux":
+        yield
+        return
+    fork: Any = get_context("fork")  # what the process needs is there, and nothing is loaded again
+    with ProcessPoolExecutor(1, fork, _remember, (roll_out,)) as pool:
+        roll_out.keep(judge_steps, pool.submit(_judge_remembered))
+        yield
+
+
+_remembered: list[RollOut] = []
+
+
+def _remember(roll_out: RollOut) -> None:
+    _remembered[:] = [roll_out]
+
+
+def _judge_remembered() -> Any:
+    return judge_steps(_remembered[0])

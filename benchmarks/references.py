@@ -1,0 +1,130 @@
+"""References that are shipped: a scene of the T-shirt's test motions is scored without being simulated.
+
+A file has the simulation to four micrometres, its quasi-static solution at the hem, and the metrics of
+simulation, skinning, SNUG and PBNS. It serves a scene whose declaration, sizes and protocol are those that
+it was made with. `benchmarks.publish references` makes them.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from benchmarks.plan.cell import flat
+from benchmarks.plan.plan import Plan, protocol_of
+from benchmarks.provenance import digest
+from benchmarks.results.protocol import DIGESTS, OWN
+from benchmarks.runner.schedule import declared
+from benchmarks.scene import Scene
+from reference_sim.files.array_file import read_arrays
+from reference_sim.files.atomic_files import replacing
+from reference_sim.geometry.topology import half_edges
+from snug.trained import FOLDER as NETWORKS
+from snug.trained import SUFFIX, network_name
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from benchmarks.metric import Faces, Positions
+
+FOLDER = Path(__file__).parent / "reference_data"
+METHODS = ("simulation", "skinning", "snug", "pbns")  # whose metrics are shipped
+TRAINED = METHODS[2:]
+STEP = 2.0**-18  # [m] to which positions are rounded
+OF_THE_REPORT = ("statistics", "sampling")  # parts of the protocol that no single scene depends on
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """What is shipped of a scene.
+
+    Attributes:
+        positions: (T,V,3) [m] of the simulation, its start included.
+        hem: (T,H,3) [m], its quasi-static solution at the garment's hem.
+        status, reason: how the simulation ended.
+        metrics: method -> metric -> number.
+        origin: commit, preset and hardware of the numbers.
+        networks: method -> digest of the network that was measured.
+    """
+
+    positions: Positions
+    hem: Positions
+    status: str = "ok"
+    reason: str = ""
+    metrics: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    origin: Mapping[str, str] = field(default_factory=dict)
+    networks: Mapping[str, str] = field(default_factory=dict)
+
+
+def packaged_network(method: str) -> Path:
+    """Return the file of the package's network for the T-shirt."""
+    return NETWORKS / f"{network_name(method, 'tshirt', 0)}{SUFFIX}"
+
+
+def key_of(scene: Scene, plan: Plan, faces: Faces) -> str:
+    """Return the digest of all that makes the numbers of a scene what they are, but for code."""
+    sizes, declaration = plan.study.sizes, declared(scene) | {"faces": digest(np.asarray(faces))}
+    del declaration["metrics"]
+    parts = {name: value for name, value in DIGESTS.items() if name not in OF_THE_REPORT}
+    return digest([declaration, sizes.garment_vertices, sizes.frames, sizes.gap_samples, parts])
+
+
+def find_reference(scene: Scene, plan: Plan, faces: Faces) -> Reference | str:
+    """Return the reference of a scene of a plan, on a mesh with these triangles, or why none is shipped."""
+    path = FOLDER / f"{flat(scene.name)}.npz"
+    own = any(protocol_of(cell, plan) == OWN for cell in plan.cells if cell.scene == scene)
+    if own or not path.is_file():
+        return "none is shipped for this scene, garment, body, motion and sizes"
+    arrays = read_arrays(path)
+    facts = json.loads(str(arrays.pop("facts")))
+    if facts.pop("key") != key_of(scene, plan, faces):
+        return f"{path.name} is of another scene or protocol"
+    moves, hem = (_unpacked(arrays[name]) for name in ("positions", "hem"))
+    order, parents = _tree(faces)
+    for vertex in order[1:]:
+        moves[:, vertex] += moves[:, parents[vertex]]
+    return Reference(*(STEP * x.cumsum(axis=0).cumsum(axis=0) for x in (moves, hem)), **facts)
+
+
+def write_reference(scene: Scene, plan: Plan, reference: Reference, faces: Faces) -> Path:
+    """Write the file of a scene; return its path."""
+    rounded = (np.rint(x / STEP).astype(np.int64) for x in (reference.positions, reference.hem))
+    positions, hem = (np.diff(x, n=2, axis=0, prepend=0 * x[:2]) for x in rounded)
+    order, parents = _tree(faces)
+    beside = positions.copy()
+    beside[:, order[1:]] -= positions[:, parents[order[1:]]]
+    names = ("status", "reason", "metrics", "origin", "networks")
+    facts = {"key": key_of(scene, plan, faces)} | {name: getattr(reference, name) for name in names}
+    path = FOLDER / f"{flat(scene.name)}.npz"
+    path.parent.mkdir(exist_ok=True)
+    with replacing(path) as temporary, temporary.open("wb") as stream:
+        np.savez_compressed(
+            stream, positions=_packed(beside), hem=_packed(hem), facts=np.array(json.dumps(facts))
+        )
+    return path
+
+
+def _tree(faces: Faces) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """Return all vertices, each behind a neighbour, and this neighbour of each: both move nearly alike."""
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import breadth_first_order
+
+    halves = half_edges(faces)
+    graph = coo_array((np.ones(len(halves)), tuple(halves.T))).tocsr()
+    return breadth_first_order(graph, 0, directed=False)
+
+
+def _packed(numbers: NDArray[np.int64]) -> NDArray[np.uint8]:
+    """Return whole numbers as bytes (4,...), signs in the lowest bit: the upper bytes are mostly 0."""
+    moved = ((numbers << 1) ^ (numbers >> 63)).astype("<u4")
+    return np.moveaxis(moved[..., None].view(np.uint8), -1, 0)
+
+
+def _unpacked(packed: NDArray[np.uint8]) -> NDArray[np.int64]:
+    whole = np.ascontiguousarray(np.moveaxis(packed, 0, -1)).view("<u4")[..., 0].astype(np.int64)
+    return (whole >> 1) ^ -(whole & 1)
