@@ -22,6 +22,7 @@ from benchmarks.metric import RollOut
 from benchmarks.metrics.energy_gap import judge_steps
 from benchmarks.plan.cell import Cell, TaskId, id_of
 from benchmarks.plan.plan import Plan, runs
+from benchmarks.provenance import digest_of_file
 from benchmarks.references import TRAINED, Reference, find_reference, packaged_network
 from benchmarks.results.run_folder import RunFolder, model_path
 from benchmarks.runner.cells import prepared_method, run_cell
@@ -32,6 +33,8 @@ from benchmarks.runner.run_json import RunLog, now
 from benchmarks.runner.task import Context, Outcome
 from benchmarks.scene import Scene
 from reference_sim import Trajectory
+
+OLDER = "SNUG or PBNS is of an earlier network of the package; benchmarks.publish references measures it"
 
 
 def evaluate(plan: Plan, references: Mapping[str, Reference] | None = None) -> RunLog:
@@ -44,13 +47,15 @@ def evaluate(plan: Plan, references: Mapping[str, Reference] | None = None) -> R
     Raises:
         RollOutFileError: a roll-out that does not belong to its scene; then nothing is written.
     """
-    assets, found = _assets(plan), dict(references or {})
+    assets, found = assets_of(plan), dict(references or {})
     folder = RunFolder(plan.folder)
     contexts = {s.name: Context(folder, assets, {"scene": s.build(assets)}) for s in plan.scenes}
     for scene in plan.scenes if references is None else ():
-        shipped = find_reference(scene, plan, contexts[scene.name].memo["scene"].cloth.faces)
+        shipped = find_reference(scene, plan, contexts[scene.name].memo["scene"])
         if isinstance(shipped, Reference):
             found[scene.name] = shipped
+            if any(digest_of_file(packaged_network(name)) != at for name, at in shipped.networks.items()):
+                print(f"{scene.name}: {OLDER}", file=sys.stderr)
         elif any(
             c.entry.role == "reference" and c.entry.module != MODULE and runs(c) for c in plan.cells
         ):
@@ -75,8 +80,8 @@ def evaluate(plan: Plan, references: Mapping[str, Reference] | None = None) -> R
     return log
 
 
-def _assets(plan: Plan) -> Assets | None:
-    """Open body, garments and the motions of the scenes alone."""
+def assets_of(plan: Plan) -> Assets | None:
+    """Open body, garments and the motions of the scenes alone; None without a dressed scene."""
     read = plan.inputs.motions
     names = dict.fromkeys(scene.motion for scene in plan.scenes if scene.dressed)
     motions = [read[name] if name in read else embedded_motions([name])[0] for name in names]

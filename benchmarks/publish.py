@@ -7,24 +7,30 @@ import shutil
 import subprocess
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
+from benchmarks.plan.cell import flat
+from benchmarks.plan.plan import make_plan
 from benchmarks.plan.study import Show, StudyError, read_study, study_names
-from benchmarks.provenance import commit
+from benchmarks.provenance import commit, digest_of_file
 from benchmarks.results.row import USABLE, ResultsError
 from benchmarks.results.run_folder import RunFolder, model_path
 from benchmarks.runner.execute_plan import accepted
 from benchmarks.timing import one_thread
 from reference_sim.command_line import Parser, command
 from reference_sim.files.atomic_files import new_folder
+from snug.motion.library import TEST
 
 PROGRAM = "benchmarks.publish"
 WORK = Path("reports/runs/published")
 TARGET = Path("reports/published")
+REFERENCES = "references"  # in place of a study
 KEPT = ("results.csv", "run.json", "report.pdf", "tables")
 EXAMPLES = """examples:
   python -m benchmarks.publish shapes                one of them
   python -m benchmarks.publish                       all of them
+  python -m benchmarks.publish references            what benchmarks.score takes in place of a simulation
 
 Each run goes on where it was stopped, in a folder of its own below --out: what is not timed may be run there
   before, by benchmarks.run with more workers or on a cluster. When it has ended well, its rows, tables, PDF,
@@ -51,6 +57,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     options = parser.parse_args(arguments)
     known, head, failed = published_studies(), commit(), 0
+    if options.studies == [REFERENCES]:
+        for motion in TEST:
+            print(make_reference(f"tshirt/{motion}", options.out / REFERENCES), flush=True)
+        return 0
     names = options.studies or known
     if silent := [name for name in names if read_study(name).show is None]:
         raise StudyError(f"study {silent[0]}: has no [show]: the studies {', '.join(known)} do")
@@ -63,6 +73,48 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"{PROGRAM}: {name}: {error}; not published", file=sys.stderr)
             failed = 1
     return failed
+
+
+def make_reference(name: str, out: Path) -> Path:
+    """Make the file of benchmarks.references of a scene; return its path.
+
+    A scene is simulated where it has none that fits; else only what is measured beside it is made anew.
+    """
+    from benchmarks.evaluate import assets_of, evaluate  # loads the simulator
+    from benchmarks.references import (
+        METHODS,
+        TRAINED,
+        Reference,
+        find_reference,
+        packaged_network,
+        write_reference,
+    )
+    from reference_sim import Trajectory
+
+    study = replace(read_study("full:garments"), scenes=(name,), methods=METHODS)
+    plan = make_plan(study, folder=out / flat(name))
+    cells = (replace(cell, entry=replace(cell.entry, timed=False)) for cell in plan.cells)
+    plan, run = replace(plan, cells=tuple(cells)), RunFolder(plan.folder)
+    scene = plan.scenes[0]
+    built = scene.build(assets_of(plan))
+    reference = find_reference(scene, plan, built)
+    if not isinstance(reference, Reference):
+        evaluate(plan, {})
+        simulation = Trajectory.load(run.trajectory_path(name, METHODS[0]))
+        assert built.dressed is not None
+        hem = Trajectory.load(run.quasi_static_path(name)).positions[:, built.dressed.garment.hem]
+        row = next(row for row in run.read_rows() if row.method == METHODS[0])
+        reference = Reference(simulation.positions, hem, row.status, row.reason)
+    log = evaluate(plan, {name: replace(reference, metrics={})})
+    metrics = {
+        method: {
+            row.metric: row.value for row in log.rows if row.method == method and row.value is not None
+        }
+        for method in METHODS
+    }
+    networks = {method: digest_of_file(packaged_network(method)) for method in TRAINED}
+    known = replace(reference, metrics=metrics, origin=log.origin, networks=networks)
+    return write_reference(scene, plan, known, built)
 
 
 def published_studies() -> list[str]:

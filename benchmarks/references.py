@@ -30,13 +30,20 @@ from snug.trained import SUFFIX, network_name
 if TYPE_CHECKING:
     from numpy.typing import NDArray
 
-    from benchmarks.metric import Faces, Positions
+    from benchmarks.metric import Faces, Floats, Positions
+    from benchmarks.scene import BuiltScene
 
 FOLDER = Path(__file__).parent / "reference_data"
 METHODS = ("simulation", "skinning", "snug", "pbns")  # whose metrics are shipped
 TRAINED = METHODS[2:]
 STEP = 2.0**-18  # [m] to which positions are rounded
-OF_THE_REPORT = ("statistics", "sampling")  # parts of the protocol that no single scene depends on
+PARTS = (
+    "scenes",
+    "materials",
+    "metrics",
+    "reference",
+)  # of the protocol: what a scene's numbers depend on
+SAME = 1e-4  # [rad], [m] by which one motion may differ from another processor's
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,46 +73,56 @@ def packaged_network(method: str) -> Path:
     return NETWORKS / f"{network_name(method, 'tshirt', 0)}{SUFFIX}"
 
 
-def key_of(scene: Scene, plan: Plan, faces: Faces) -> str:
-    """Return the digest of all that makes the numbers of a scene what they are, but for code."""
-    sizes, declaration = plan.study.sizes, declared(scene) | {"faces": digest(np.asarray(faces))}
+def key_of(scene: Scene, plan: Plan, built: BuiltScene) -> str:
+    """Return the digest of all that makes the numbers of a scene what they are, but for code and motion."""
+    sizes, declaration = plan.study.sizes, declared(scene) | {"faces": digest(built.cloth.faces)}
     del declaration["metrics"]
-    parts = {name: value for name, value in DIGESTS.items() if name not in OF_THE_REPORT}
+    parts = [DIGESTS[name] for name in PARTS]
     return digest([declaration, sizes.garment_vertices, sizes.frames, sizes.gap_samples, parts])
 
 
-def find_reference(scene: Scene, plan: Plan, faces: Faces) -> Reference | str:
-    """Return the reference of a scene of a plan, on a mesh with these triangles, or why none is shipped."""
+def motion_of(built: BuiltScene) -> Floats:
+    """Return poses [rad] and translations [m] of a scene's frames, (T,N)."""
+    assert built.dressed is not None
+    motion = built.dressed.motion
+    return np.column_stack([motion.poses.reshape(motion.frames, -1), motion.translations])
+
+
+def find_reference(scene: Scene, plan: Plan, built: BuiltScene) -> Reference | str:
+    """Return the reference of a scene of a plan, or why none is shipped."""
     path = FOLDER / f"{flat(scene.name)}.npz"
     own = any(protocol_of(cell, plan) == OWN for cell in plan.cells if cell.scene == scene)
     if own or not path.is_file():
         return "none is shipped for this scene, garment, body, motion and sizes"
     arrays = read_arrays(path)
     facts = json.loads(str(arrays.pop("facts")))
-    if facts.pop("key") != key_of(scene, plan, faces):
-        return f"{path.name} is of another scene or protocol"
+    moved, motion = arrays["motion"], motion_of(built)
+    same = moved.shape == motion.shape and np.allclose(moved, motion, rtol=0.0, atol=SAME)
+    if facts.pop("key") != key_of(scene, plan, built) or not same:
+        return f"{path.name} is of another scene, motion or protocol"
     moves, hem = (_unpacked(arrays[name]) for name in ("positions", "hem"))
-    order, parents = _tree(faces)
+    order, parents = _tree(built.cloth.faces)
     for vertex in order[1:]:
         moves[:, vertex] += moves[:, parents[vertex]]
     return Reference(*(STEP * x.cumsum(axis=0).cumsum(axis=0) for x in (moves, hem)), **facts)
 
 
-def write_reference(scene: Scene, plan: Plan, reference: Reference, faces: Faces) -> Path:
+def write_reference(scene: Scene, plan: Plan, reference: Reference, built: BuiltScene) -> Path:
     """Write the file of a scene; return its path."""
     rounded = (np.rint(x / STEP).astype(np.int64) for x in (reference.positions, reference.hem))
     positions, hem = (np.diff(x, n=2, axis=0, prepend=0 * x[:2]) for x in rounded)
-    order, parents = _tree(faces)
+    order, parents = _tree(built.cloth.faces)
     beside = positions.copy()
     beside[:, order[1:]] -= positions[:, parents[order[1:]]]
     names = ("status", "reason", "metrics", "origin", "networks")
-    facts = {"key": key_of(scene, plan, faces)} | {name: getattr(reference, name) for name in names}
+    facts = {"key": key_of(scene, plan, built)} | {name: getattr(reference, name) for name in names}
     path = FOLDER / f"{flat(scene.name)}.npz"
     path.parent.mkdir(exist_ok=True)
     with replacing(path) as temporary, temporary.open("wb") as stream:
         np.savez_compressed(
-            stream, positions=_packed(beside), hem=_packed(hem), facts=np.array(json.dumps(facts))
-        )
+            stream, positions=_packed(beside), hem=_packed(hem), facts=np.array(json.dumps(facts)),
+            motion=motion_of(built).astype(np.float32),
+        )  # fmt: skip
     return path
 
 
