@@ -50,16 +50,17 @@ def evaluate(plan: Plan, references: Mapping[str, Reference] | None = None) -> R
     assets, found = assets_of(plan), dict(references or {})
     folder = RunFolder(plan.folder)
     contexts = {s.name: Context(folder, assets, {"scene": s.build(assets)}) for s in plan.scenes}
+    at_hand = [cell for cell in plan.cells if cell.entry.role == "reference" and runs(cell)]
+    simulated = {cell.scene for cell in at_hand if cell.entry.module != MODULE}
+    notes = []
     for scene in plan.scenes if references is None else ():
         shipped = find_reference(scene, plan, contexts[scene.name].memo["scene"])
-        if isinstance(shipped, Reference):
-            found[scene.name] = shipped
-            if any(digest_of_file(packaged_network(name)) != at for name, at in shipped.networks.items()):
-                print(f"{scene.name}: {OLDER}", file=sys.stderr)
-        elif any(
-            c.entry.role == "reference" and c.entry.module != MODULE and runs(c) for c in plan.cells
-        ):
-            print(f"{scene.name}: {shipped}: it is simulated, which takes minutes", file=sys.stderr)
+        if isinstance(shipped, str):
+            notes += [f"{shipped}: it is simulated, which takes minutes"] * (scene in simulated)
+            continue
+        found[scene.name] = shipped
+        if any(digest_of_file(packaged_network(name)) != at for name, at in shipped.networks.items()):
+            notes.append(OLDER)
     kept = (c for c in plan.cells if c.method not in TRAINED or c.scene.name in found)
     plan = replace(plan, cells=tuple(kept))
     for name, reference in found.items():
@@ -68,6 +69,7 @@ def evaluate(plan: Plan, references: Mapping[str, Reference] | None = None) -> R
     for cell in plan.cells:
         if cell.entry.module == MODULE:
             prepared_method(cell, contexts[cell.scene.name])
+    print(*dict.fromkeys(notes), sep="\n", end="\n" * bool(notes), file=sys.stderr)
     log, outcomes = RunLog(plan), dict[TaskId, Outcome]()
     if assets:
         log.open_assets(assets)

@@ -104,7 +104,8 @@ def find_reference(scene: Scene, plan: Plan, built: BuiltScene) -> Reference | s
     order, parents = _tree(built.cloth.faces)
     for vertex in order[1:]:
         moves[:, vertex] += moves[:, parents[vertex]]
-    return Reference(*(STEP * x.cumsum(axis=0).cumsum(axis=0) for x in (moves, hem)), **facts)
+    positions, still = (STEP * x.cumsum(axis=0).cumsum(axis=0) for x in (moves, hem))
+    return Reference(positions, still, **facts)
 
 
 def write_reference(scene: Scene, plan: Plan, reference: Reference, built: BuiltScene) -> Path:

@@ -53,8 +53,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return carry_out(plan, dry_run=options.dry_run)
 
 
-def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, report: bool = True) -> int:
-    """Run the plan, or print what would be run; return the exit status. report: whether to make one."""
+def carry_out(plan: Plan, *, dry_run: bool = False) -> int:
+    """Run the plan, or print what would be run; return the exit status."""
     for motion in plan.inputs.motions.values():
         print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
     if absent := plan.study.motion_files.absent(plan.inputs.motions):
@@ -80,9 +80,9 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, repo
         assets = check_methods(plan)
         print(plan.study.question, file=sys.stderr)
         with held(plan.folder):
-            return execute(plan, assets, report=report)
+            return execute(plan, assets)
     except (RunRefused, DeclarationError, RollOutFileError) as error:
-        print(f"{program}: {error}", file=sys.stderr)
+        print(f"{PROGRAM}: {error}", file=sys.stderr)
         return 2
     except (RunStopped, OSError) as error:
         from reference_sim.files.atomic_files import disk_full
@@ -90,10 +90,10 @@ def carry_out(plan: Plan, *, dry_run: bool = False, program: str = PROGRAM, repo
         line = str(error) if isinstance(error, RunStopped) or error.filename else ""
         if not (line := disk_full(error) or line):
             raise
-        print(f"{program}: {line}; the same command goes on from there", file=sys.stderr)
+        print(f"{PROGRAM}: {line}; the same command goes on from there", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
-        print(f"{program}: interrupted; what was finished lies whole in {plan.folder}", file=sys.stderr)
+        print(f"{PROGRAM}: interrupted; what was finished lies whole in {plan.folder}", file=sys.stderr)
         return 130
 
 

@@ -13,28 +13,40 @@ import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from datetime import date
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-from benchmarks.external.roll_out_files import RollOutOption
+import numpy as np
+
+from benchmarks.external.roll_out_files import PLACE, RollOutOption, read_roll_out
+from benchmarks.plan.cell import flat
 from benchmarks.plan.plan import Plan, make_plan
 from benchmarks.plan.study import read_fields, read_study
 from benchmarks.presets import find_preset
-from benchmarks.provenance import digest_of_file
+from benchmarks.provenance import digest, digest_of_file
 from benchmarks.results.protocol import DIGEST, NUMBER
 from benchmarks.results.row import USABLE
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.score import MEASURED_BESIDE
 from benchmarks.timing import one_thread
 from reference_sim.command_line import Parser, command
+from reference_sim.files.array_file import read_arrays
 from reference_sim.given_files import regular
 from snug.motion.library import TEST
+
+if TYPE_CHECKING:
+    from benchmarks.metric import Floats, Positions
 
 PROGRAM = "benchmarks.submit"
 PRESET = find_preset("quick")
 SCENES = tuple(f"tshirt/{motion}" for motion in TEST[: PRESET.test_motions])  # of a full entry
 METADATA = "entry.toml"
 DECLARED = "cost/frame"  # the one cost that an entry has: as its authors say
-KEPT = ("preset", "metrics", "methods", "scenes", "cases")  # of run.json
+KEPT = ("preset", "commit", "metrics", "methods", "scenes", "cases")  # of run.json
+PICTURE = "picture.png"
+SAMPLED, VERTICES = "sampled.npz", 20  # so many vertices of each roll-out: by them copies are found
+COPIED, SAME = 0.9, 1e-4  # share of frames, and their root mean square distance [m], of a copy
 EXAMPLES = """examples:
   python -m benchmarks.export tshirt/dance_turn -o dance            a scene, to be dressed elsewhere
   python -m benchmarks.submit check submissions/mine                seconds: metadata, files, protocol
@@ -164,14 +176,22 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
             check_scores(entry)
             check_methods(plan)
+            if path := entry.metadata.roll_outs:
+                files = {name: entry.path / path.replace(PLACE, name) for name in map(flat, entry.scenes)}
+                find_copies(
+                    entry, {f"{n}-seed0": sampled(read_roll_out(f).positions) for n, f in files.items()}
+                )
             print(f"{entry.path}: nothing found; {len(entry.scenes)} of {len(SCENES)} scenes")
             return 0
         from benchmarks.evaluate import evaluate  # loads the simulator
-        from reports.build import build_row
+        from reports.build import build_row, save_still
 
         evaluate(plan)
-        count = write_scores(entry, RunFolder(plan.folder))
-        print(build_row(plan.folder))
+        run = RunFolder(plan.folder)
+        count = write_scores(entry, run)
+        save_still(run.path, entry.name, entry.scores.path / PICTURE)
+        note_files(entry)
+        print(build_row(run.path))
     print(f"{entry.path}: {count} rows in {entry.scores.rows_path}")
     return 0
 
@@ -202,10 +222,11 @@ def check_scores(entry: Entry) -> None:
 def write_scores(entry: Entry, run: RunFolder) -> int:
     """Write rows without what the machine adds to them, and digests of all that was scored; return how many.
 
-    The bytes are the same each time. Raises EntryError where a roll-out did not come to its last frame:
-    the mean over the other scenes would be of easier ones.
+    The bytes are the same each time, but for commit and date. Raises EntryError for a copy, and where a
+    roll-out did not come to its last frame: the mean over the other scenes would be of easier ones.
     """
-    from benchmarks.metrics import find_metric  # loads numpy
+    from benchmarks.metrics import find_metric
+    from reference_sim import Trajectory
 
     rows = [
         replace(row, commit="", hardware="")
@@ -220,14 +241,62 @@ def write_scores(entry: Entry, run: RunFolder) -> int:
         if bad or not mine:
             why = f"seed {bad.seed}: {bad.status}: {bad.reason}" if bad else "it did not run"
             raise EntryError(f"{entry.path}: {scene}: {why}")
+    cells = dict.fromkeys((row.scene, row.method, row.seed) for row in rows if row.method == entry.name)
+    frames = {
+        f"{flat(scene)}-seed{seed}": Trajectory.load(run.trajectory_path(scene, method, seed)).positions
+        for scene, method, seed in cells
+    }
+    samples = {name: sampled(positions) for name, positions in frames.items()}
+    find_copies(entry, samples)
     config, folder = run.read_config(), entry.scores
     folder.path.mkdir(exist_ok=True)
     folder.write_rows(rows)
+    np.savez(folder.path / SAMPLED, **samples)
     folder.write_config({
         "protocol": {"number": NUMBER, "digest": DIGEST}, **{name: config.get(name) for name in KEPT},
-        "metadata": asdict(entry.metadata), "entry": entry.digests(),
+        "date": date.today().isoformat(), "metadata": asdict(entry.metadata),
+        "roll_outs": {name: digest(positions) for name, positions in frames.items()},
     })  # fmt: skip
     return len(rows)
+
+
+def sampled(positions: Positions) -> Floats:
+    """Return some vertices of each frame about their centre, (T,N) [m]."""
+    few = positions[:, :: max(positions.shape[1] // VERTICES, 1)]
+    return (few - few.mean(axis=1, keepdims=True)).reshape(len(few), -1).astype(np.float32)
+
+
+def find_copies(entry: Entry, samples: dict[str, Floats]) -> None:
+    """Raise EntryError for a roll-out whose frames another scene, or another entry beside it, has.
+
+    So duplicates are found, frames in reverse, and one frame held. samples: name of a roll-out -> (T,N).
+    """
+    from scipy.spatial.distance import cdist
+
+    others: dict[tuple[str, str], Floats] = {}
+    for path in sorted(entry.path.resolve().parent.glob(f"*/scores/{SAMPLED}")):
+        author = path.parents[1].name
+        others |= {(author, n): x for n, x in read_arrays(path).items() if author != entry.name}
+    others |= {(entry.name, name): frames for name, frames in samples.items()}
+    for name, frames in samples.items():
+        for whose, theirs in others.items():
+            theirs = theirs[:1] if whose == (entry.name, name) else theirs
+            if theirs.shape[1] != frames.shape[1]:
+                continue
+            apart = cdist(frames, theirs) / math.sqrt(frames.shape[1] / 3)
+            same, nearest = apart.min(axis=1) <= SAME, apart.argmin(axis=1)
+            if same.mean() >= COPIED:
+                order = np.sign(np.diff(nearest[same]).mean())
+                way = {0.0: "one of them held", 1.0: "in order", -1.0: "in reverse"}[float(order)]
+                raise EntryError(
+                    f"{entry.path}: {name}: its frames are those of {' '.join(whose)}, {way}"
+                )
+
+
+def note_files(entry: Entry) -> None:
+    """Write the digests of all that was scored into run.json."""
+    config = entry.scores.read_config()
+    entry.scores.write_config({**config, "entry": entry.digests()})
 
 
 if __name__ == "__main__":

@@ -75,6 +75,22 @@ def build_row(run_dir: str | Path) -> str:
     return markdown_table(text_rows(run, write_paper_table(folder, run)))
 
 
+def save_still(run_dir: str | Path, method: str, path: Path) -> None:
+    """Save a picture of the method's garment in a lively frame of the run's first scene."""
+    from PIL import Image
+
+    from reports.finished_run import read_run
+    from reports.pictures import AZIMUTH, SceneRollOuts, draw_frames
+
+    run = read_run(RunFolder(run_dir))
+    scene = str(run.frame[run.frame["method"] == method]["scene"].iloc[0])
+    cloth = run.roll_outs.cloth(scene, method, 0)
+    assert cloth is not None
+    selected = SceneRollOuts(scene, {method: cloth}, None, {method: run.label(method)})
+    (image,) = draw_frames(selected, 160, AZIMUTH, [selected.lively_frame()[0]])
+    Image.fromarray(image).quantize(32).save(path)
+
+
 @command("reports.build", goes_on="the same command begins again", bad_input=(ResultsError,))
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""

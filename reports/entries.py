@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import base64
 import json
 from collections.abc import Sequence
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 
 from benchmarks.results.protocol import LEAST_MOTIONS
@@ -21,7 +23,11 @@ ENTRIES, PAGE = "submissions", "index.html"
 SCRIPTS = ("tables", "entries")  # in this order
 DYNAMICS, PENETRATION, TIME = "dynamics/common_correlation", "penetration/surface", "cost/frame"
 ROLES = ("baseline", "network", "solver", "external")  # of the project's own methods
+PICTURE = "picture.png"
+# What stands behind numbers: of an entry whose files are not as they were scored nothing was computed here.
+VERIFIED, FILES_ONLY, UNVERIFIED = "verified from vertices", "files only", "declared"
 COLUMNS = (
+    Column("rank", "Rank"),
     Column("entry", "Entry", text=True),
     Column("relative_excess/total", "Relative excess", "%"),
     Column(DYNAMICS, "Dynamic correlation"),
@@ -29,6 +35,10 @@ COLUMNS = (
     Column(TIME, "Time", "ms"),
     Column("clock", "Time is", text=True),
     Column("learned_from", "Learned from", text=True),
+    Column("proof", "Scores", text=True),
+    Column("commit", "Commit", text=True),
+    Column("date", "Date", text=True),
+    Column("hash", "Roll-outs", text=True),
 )
 
 
@@ -42,6 +52,7 @@ class Scored:
         title: for people.
         learned_from: training data in words.
         scenes: that the row is over.
+        folder: of an entry.
     """
 
     run: Run
@@ -49,6 +60,25 @@ class Scored:
     title: str
     learned_from: str
     scenes: tuple[str, ...]
+    folder: Path | None = None
+
+    def proof(self) -> str:
+        """Return what its numbers rest on: its program was run here, or its files measured, or neither."""
+        files = self.run.config.get("entry") or {}
+        if self.folder is None or RunFolder(self.folder).changed(files) or not files:
+            return VERIFIED if self.folder is None else UNVERIFIED
+        return VERIFIED if self.run.config["metadata"].get("program") else FILES_ONLY
+
+    def title_cell(self) -> list[str | None]:
+        """Return the title as the page's script shows it: with a link, and a picture of one frame."""
+        if self.folder is None:
+            return [self.title, self.title, "", ""]
+        url, picture = self.run.config["metadata"].get("url", ""), self.folder / "scores" / PICTURE
+        data = base64.b64encode(picture.read_bytes()).decode() if picture.is_file() else ""
+        return [
+            self.title, self.title, "", "", url if url.startswith("https://") else None,
+            f"data:image/png;base64,{data}" if data else None,
+        ]  # fmt: skip
 
     def cells(self) -> tuple[Cell, ...]:
         """Return its row, as COLUMNS has it."""
@@ -62,7 +92,11 @@ class Scored:
         shown: Cell = None
         if excess is not None:  # an interval over fewer motions says nothing
             shown = excess.effect if excess.effect.motions >= LEAST_MOTIONS else excess.typical
-        return (self.title, shown, *numbers, clock, self.learned_from)
+        config = self.run.config
+        hashes = config.get("roll_outs") if self.folder else None
+        origin = (config.get("commit") or "", (config.get("date") or config.get("started") or "")[:10])
+        of = sha256("".join(hashes.values()).encode()).hexdigest()[:8] if hashes else ""
+        return (None, self.title, shown, *numbers, clock, self.learned_from, self.proof(), *origin, of)
 
 
 def of_entry(folder: Path) -> Scored:
@@ -85,7 +119,7 @@ def of_entry(folder: Path) -> Scored:
     if not scenes:
         remedy = f"give the folder its old name, or {again}"
         raise ResultsError(f"{scores.rows_path}: no scores of '{name}': {remedy}")
-    return Scored(run, name, f"{title}; {authors}", data, scenes)
+    return Scored(run, name, f"{title}; {authors}", data, scenes, folder)
 
 
 def of_published(name: str, run: Run, scenes: Sequence[str]) -> list[Scored]:
@@ -105,8 +139,10 @@ def full_scenes(run: Run) -> tuple[str, ...]:
     return tuple(f"{run.first_garment}/{motion}" for motion in motions[:count])
 
 
-def entries_tables(entries: Sequence[Scored], name: str, run: Run) -> list[tuple[Table, Run]]:
-    """Return a table for each protocol and set of scenes, full ones first, and a run of its protocol.
+def entries_tables(
+    entries: Sequence[Scored], name: str, run: Run
+) -> list[tuple[Table, Sequence[Scored]]]:
+    """Return a table for each protocol and set of scenes, full ones first, and whom its rows are of.
 
     No table has rows of two protocols, or means over different scenes. Methods of the published run of
     that name stand in each table of their protocol. Rows are sorted by relative excess, rows without it
@@ -125,13 +161,13 @@ def entries_tables(entries: Sequence[Scored], name: str, run: Run) -> list[tuple
         part = "all" if set(scenes) == set(full) else f"{len(scenes)} of {len(full)}: {', '.join(scenes)}"
         what = f"Protocol {protocol}" if protocol[:1].isdigit() else protocol.capitalize()
         caption = f"{what}; scenes: {part}."
-        rows = tuple(cells for cells, _ in lines)
-        tables.append((Table("entries", COLUMNS, rows, caption), lines[0][1].run))
+        rows = tuple((place, *cells[1:]) for place, (cells, _) in enumerate(lines, 1))
+        tables.append((Table("entries", COLUMNS, rows, caption), [scored for _, scored in lines]))
     return tables
 
 
 def _excess(cells: tuple[Cell, ...]) -> float:
-    shown = cells[1].shown if isinstance(cells[1], Effect) else cells[1]
+    shown = cells[2].shown if isinstance(cells[2], Effect) else cells[2]
     return shown if isinstance(shown, float) else float("inf")
 
 
@@ -142,7 +178,11 @@ def page_of(folder: Path, name: str, run: Run) -> str:
         ResultsError: scores that cannot be read.
     """
     entries = [of_entry(path.parent) for path in sorted(folder.glob("*/entry.toml"))]
-    content = [table_data(of_table, table) for table, of_table in entries_tables(entries, name, run)]
+    content = []
+    for table, lines in entries_tables(entries, name, run):
+        content.append(data := table_data(lines[0].run, table))
+        for row, scored in zip(data["rows"], lines):
+            row[1] = scored.title_cell()
     text = json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     # No text of an entry ends the element.
     return filled("entries.html", SCRIPTS, content=text.replace("<", "\\u003c"))

@@ -41,8 +41,8 @@ def summary(rows: Sequence[Row]) -> str:
     return "; ".join(last)
 
 
-def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) -> int:
-    """Run the plan, with its assets where they have been made; then make its report unless that is unwanted.
+def execute(plan: Plan, assets: Assets | None = None) -> int:
+    """Run the plan, with its assets where they have been made; then make its report.
 
     Returns 0 when all ended well, 1 when something failed or there is no report. Raises RunRefused where
     the plan's cluster is gone, or no network in the files that it names is of its meshes and motions.
@@ -68,7 +68,7 @@ def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) ->
     rows = rows_of(plan, runner.tasks, runner.outcomes)
     log.write_rows(rows)
     log.note_outcomes(runner)
-    answer = make_report(log) if report else ""
+    answer = make_report(log)
     print(*filter(None, (answer, summary(log.rows))), sep="\n", flush=True)
     failed = [row for row in log.rows if not accepted(row)]
     ends = dict.fromkeys(f"{row.scene} x {row.method}: {row.status}: {row.reason}" for row in failed)
@@ -78,7 +78,7 @@ def execute(plan: Plan, assets: Assets | None = None, *, report: bool = True) ->
     if runner.reused:
         lines.append(f"{len(runner.reused)} results taken from earlier runs in this folder")
     print(*lines, sep="\n", end="\n" if lines else "", file=sys.stderr)
-    if report and answer is not None:
+    if answer is not None:
         print(log.folder.report_path.resolve(), flush=True)
     return 0 if answer is not None and not failures else 1
 

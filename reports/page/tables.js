@@ -64,9 +64,10 @@ function showTable(table, root, definition, note) {
 
 function lineOf(row, table) {
   const cells = row.map((cell, k) => {
-    const [text, , spread, mark, link] = Array.isArray(cell) ? cell : [cell, null, '', ''];
+    const [text, , spread, mark, link, picture] = Array.isArray(cell) ? cell : [cell, null, '', ''];
     const shown = text + (mark || '');
     const node = element('td', { class: table.columns[k].words ? 'words' : '' }, link ? element('a', { href: link }, shown) : shown);
+    if (picture) node.prepend(element('img', { src: picture, alt: '', height: 80 }), element('br'));
     if (spread) node.append(element('small', {}, spread));
     return node;
   });

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+import io
 import json
 import pickle
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from benchmarks import run, score
+from benchmarks import publish, references, run, score
 from benchmarks.methods import find_method
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts
-from benchmarks.plan.study import StudyError
+from benchmarks.plan.study import StudyError, option, read_study
 from benchmarks.presets import find_preset
 from benchmarks.provenance import digest
 from benchmarks.results.run_folder import RunFolder
@@ -34,12 +36,6 @@ def no_processes():
         yield
 
 
-@pytest.fixture
-def without_report(monkeypatch):
-    """Runs end with their rows: figures, page and PDF are three seconds."""
-    monkeypatch.setattr("benchmarks.runner.execute_plan.make_report", lambda log: "")
-
-
 @pytest.fixture(scope="module")
 def made(tmp_path_factory):
     """A run of the simulation and of Newton cut after one iteration, and its two trajectories."""
@@ -59,12 +55,15 @@ def numbers(folder: RunFolder, method: str) -> dict[str, float | None]:
 
 def test_a_scored_roll_out_has_the_rows_of_the_run_it_comes_from(made, tmp_path, capsys):
     folder, mine, simulated = made
-    options = [*SCENE, "-o", str(tmp_path / "out"), "--reference", simulated]
-    assert score.main([f"mine={mine},ms=2.5", *options]) == 0
-    line = capsys.readouterr().out
-    assert line.count("\n") == 1 and "report.pdf" in line
-    assert line.startswith("mine in hanging_sheet: energy/total -0.03")
-    scored, expected = RunFolder(tmp_path / "out"), numbers(folder, "newton-1")
+    out = tmp_path / "out"
+    assert score.main([f"mine={mine},ms=2.5", *SCENE, "-o", str(out), "--reference", simulated]) == 0
+    printed = capsys.readouterr().out.splitlines()
+    assert [line.split(" | ")[0] for line in printed[2:4]] == [
+        "| Reference, from a file",
+        "| mine (declared time)",
+    ]
+    assert printed[-1] == f"mine: ok; {out}"
+    scored, expected = RunFolder(out), numbers(folder, "newton-1")
     metrics = numbers(scored, "mine")
     for name in [name for name in expected if name.startswith(("cost/", "solver/"))]:
         del expected[name]
@@ -73,28 +72,17 @@ def test_a_scored_roll_out_has_the_rows_of_the_run_it_comes_from(made, tmp_path,
     row = next(row for row in scored.read_rows() if row.method == "mine" and row.metric == "cost/frame")
     declared = "declared by its author, not measured"
     assert (row.status, row.reason, row.role) == ("ok", declared, "external")
-    assert scored.read_config()["methods"]["mine"]["label"] == "mine (declared time)"
-    assert numbers(scored, "reference")["energy/total"] == numbers(folder, "simulation")["energy/total"]
-    assert (tmp_path / "out" / "report.pdf").stat().st_size > 1000
+    beside = numbers(scored, "reference")
+    assert beside["energy/total"] == numbers(folder, "simulation")["energy/total"]
+    assert (out / "for_your_paper.tex").stat().st_size > 500
+    again = score.score(
+        f"mine={mine}", SCENE[1], study=STUDY, reference=simulated, folder=tmp_path / "again"
+    )
+    assert (again["name"], again["scene"], again["status"]) == ("mine", "hanging_sheet", "ok")
+    assert again["metrics"]["energy/strain"] == {"value": expected["energy/strain"], "unit": "J"}
 
 
-def test_numbers_come_as_json_and_in_python_without_a_report(made, tmp_path, capsys):
-    folder, mine, simulated = made
-    out = tmp_path / "out"
-    assert score.main([f"mine={mine}", *SCENE, "--reference", simulated, "--json", "-o", str(out)]) == 0
-    summary = json.loads(capsys.readouterr().out)
-    assert (summary["name"], summary["scene"], summary["status"]) == ("mine", "hanging_sheet", "ok")
-    expected = numbers(folder, "newton-1")
-    assert summary["metrics"]["energy/strain"] == {"value": expected["energy/strain"], "unit": "J"}
-    assert summary["metrics"]["gap/energy"]["value"] == expected["gap/energy"]
-    assert not (out / "report.pdf").exists()
-    beside = numbers(RunFolder(out), "reference")
-    assert "energy/total" in beside and "cost/frame" not in beside
-    more = {"study": STUDY, "reference": simulated, "folder": tmp_path / "again"}
-    assert score.score(f"mine={mine}", "hanging_sheet", **more)["metrics"] == summary["metrics"]
-
-
-def test_without_a_reference_the_reason_is_said(made, tmp_path, without_report):
+def test_without_a_reference_the_reason_is_said(made, tmp_path):
     assert score.main([f"mine={made[1]}", *SCENE, "--no-reference", "-o", str(tmp_path / "out")]) == 0
     rows = RunFolder(tmp_path / "out").read_rows()
     reasons = [(row.status, row.reason) for row in rows if row.role == "reference"]
@@ -102,6 +90,53 @@ def test_without_a_reference_the_reason_is_said(made, tmp_path, without_report):
     metrics = {row.metric for row in rows if row.role == "external"}
     assert {"energy/total", "gap/energy", "curvature/mean"} <= metrics
     assert not metrics & {"curvature/error", "distance/rms", "gap/relative", "cost/frame"}
+
+
+def test_a_shipped_reference_gives_the_numbers_of_a_fresh_simulation(tmp_path, monkeypatch, capsys):
+    """No scene is simulated that has one; of other sizes it is, and that is said."""
+    monkeypatch.setattr(references, "FOLDER", tmp_path / "shipped")
+    monkeypatch.setattr(references, "METHODS", score.MEASURED_BESIDE)
+    study = read_study("full:garments", [option("sizes", "smoke")])
+    monkeypatch.setattr(publish, "read_study", lambda name: study)
+    name, folder = "tshirt/sudden_stop", tmp_path / "made"
+    study = replace(study, split="validation")
+    publish.make_reference(name, folder)
+    skinned = Trajectory.load(RunFolder(folder / "tshirt-sudden_stop").trajectory_path(name, "skinning"))
+    np.savez(tmp_path / "mine.npz", positions=skinned.positions)
+    fresh = score.score(tmp_path / "mine.npz", name, study=study, fresh=True, folder=tmp_path / "fresh")
+    capsys.readouterr()
+    monkeypatch.setattr("benchmarks.scenes.dressed_body.simulate", None)  # of the settling
+    shipped = score.score(tmp_path / "mine.npz", name, study=study, folder=tmp_path / "quick")
+    assert "it is simulated" not in capsys.readouterr().err
+    for metric, number in fresh["metrics"].items():
+        assert shipped["metrics"][metric]["value"] == pytest.approx(
+            number["value"], rel=1e-3, abs=1e-6
+        ), metric
+    assert (
+        shipped["metrics"].keys() == fresh["metrics"].keys() >= {"gap/relative", "dynamics/common_gain"}
+    )
+    assert numbers(RunFolder(tmp_path / "quick"), "skinning") == pytest.approx(
+        numbers(RunFolder(tmp_path / "fresh"), "skinning"), rel=1e-3, abs=1e-6
+    )
+    longer = replace(study, sizes=replace(study.sizes, settle_frames=13))
+    with pytest.raises(TypeError):
+        score.score(tmp_path / "mine.npz", name, study=longer, folder=tmp_path / "other")
+    assert "none is shipped for this scene" in capsys.readouterr().err
+
+
+@pytest.mark.slow  # minutes: a whole scene is simulated
+def test_a_file_of_the_package_is_that_of_a_fresh_simulation(tmp_path):
+    """On one kind of processor: simulations are chaotic."""
+    name = "tshirt/push_recovery"
+    shipped = (references.FOLDER / "tshirt-push_recovery.npz").read_bytes()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(references, "FOLDER", tmp_path / "shipped")
+        anew = publish.make_reference(name, tmp_path / "made")
+    one, other = (dict(np.load(io.BytesIO(of))) for of in (shipped, anew.read_bytes()))
+    assert all(np.array_equal(one[array], other[array]) for array in ("positions", "hem", "motion"))
+    metrics, again = (json.loads(str(of["facts"]))["metrics"] for of in (one, other))
+    for method, values in metrics.items():
+        assert again[method] == pytest.approx(values, rel=1e-6), method
 
 
 def test_a_run_takes_roll_outs_where_there_is_a_file_and_knows_when_it_has_changed(made, tmp_path):
@@ -124,7 +159,7 @@ def test_a_run_takes_roll_outs_where_there_is_a_file_and_knows_when_it_has_chang
         key_of_mine()
 
 
-def test_a_pickle_that_brings_its_own_body_needs_no_scene(tmp_path, without_report, capsys):
+def test_a_pickle_that_brings_its_own_body_needs_no_scene(tmp_path, capsys):
     scene = small_scene("sheet_on_sphere")
     trajectory = prepared("newton-4", scene).run()
     pickled, rest, out = tmp_path / "pred.pkl", tmp_path / "rest.obj", tmp_path / "out"

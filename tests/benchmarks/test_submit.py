@@ -11,6 +11,7 @@ import pytest
 
 from benchmarks import submit
 from benchmarks.presets import find_preset
+from benchmarks.provenance import commit, digest
 from benchmarks.results.protocol import NUMBER
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.scenes import find_scene
@@ -78,6 +79,30 @@ def test_scores_are_those_of_a_run_without_clock_and_machine_and_the_same_bytes_
         assert main(["score", str(entry)]) == 0
         for name in ("results.csv", "run.json"):
             assert (entry / "scores" / name).read_bytes() == (scored / "scores" / name).read_bytes()
+
+
+def test_a_roll_out_has_a_hash_and_one_that_copies_frames_is_refused(scored, tmp_path, refused):
+    config = RunFolder(scored / "scores").read_config()
+    positions = np.load(scored / f"{SCENE}.npz")["positions"]
+    assert config["roll_outs"] == {f"{SCENE}-seed0": digest(positions.astype(float))}
+    assert config["commit"] == commit() and len(config["date"]) == 10
+    assert (scored / "scores" / submit.PICTURE).stat().st_size > 500
+    shutil.copytree(scored, tmp_path / "waving")
+    for name, way, frames in (
+        ("again", "in order", positions),
+        ("back", "in reverse", positions[::-1]),
+        ("frozen", "one of them held", np.repeat(positions[3:4], len(positions), axis=0)),
+    ):
+        np.savez(write_entry(tmp_path / name) / f"{SCENE}.npz", positions=frames)
+        refused(
+            f"its frames are those of waving {SCENE}-seed0, {way}", main, ["check", str(tmp_path / name)]
+        )
+        shutil.rmtree(tmp_path / name)
+    write_entry(tmp_path / "own")
+    np.savez(
+        tmp_path / "own" / f"{SCENE}.npz", positions=positions + [0.0, 0.02, 0.0] * positions[:, ::-1]
+    )
+    assert main(["check", str(tmp_path / "own")]) == 0
 
 
 @pytest.mark.parametrize("name", [f"{SCENE}.npz", "scores/results.csv", ".weights"])

@@ -38,8 +38,11 @@ ALLOWED = {
 FORBIDDEN = {"snug": ("reference_sim.minimise", "reference_sim.simulate", "reference_sim.time_loop")}
 # The documents list texts of the code.
 LISTING = ("reports.text.published_parts",)
-# A run ends by making the report of the run that it wrote.
-EXCEPTIONS = {("benchmarks.runner.execute_plan", "reports.build.build_report")}
+# A run ends by making the report of the run that it wrote, a score by the table of its own.
+EXCEPTIONS = {
+    ("benchmarks.runner.execute_plan", "reports.build.build_report"),
+    *((f"benchmarks.{command}", "reports.build.build_row") for command in ("score", "submit")),
+}
 # Headline geometry must not share an error with the physics.
 PURE = ("benchmarks.metrics.curvature", "benchmarks.metrics.penetration_and_distances")
 DECLARATIONS = ("benchmarks.metric.Measurements", "benchmarks.metric.metrics_of")  # no physics

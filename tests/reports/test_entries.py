@@ -7,6 +7,7 @@ import re
 
 import pytest
 
+from benchmarks.provenance import digest_of_file
 from benchmarks.results.row import DECLARED, ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reports.entries import entries_tables, full_scenes, of_entry, page_of
@@ -56,18 +57,42 @@ def test_a_table_has_one_protocol_and_one_set_of_scenes_and_is_sorted(tmp_path, 
     ]
     assert full_scenes(published) == FULL
     tables = [table for table, _ in entries_tables([*map(of_entry, made)], "quick", published)]
-    assert {table.caption: [line[0].split()[0] for line in table.rows] for table in tables} == {
+    assert {table.caption: [line[1].split()[0] for line in table.rows] for table in tables} == {
         "Protocol 0.9; scenes: all.": ["old"],
         "Protocol 1.0; scenes: all.": ["better", "SNUG", "worse", "Skinning"],
         "Protocol 1.0; scenes: 1 of 2: tshirt/a.": ["part", "SNUG", "Skinning"],
     }
-    lines = {line[0].split()[0]: line for table in tables for line in table.rows}
-    assert lines["better"][1] == pytest.approx(1.0) and lines["worse"][1] == pytest.approx(25.0)
-    assert (lines["better"][5], lines["SNUG"][5]) == ("declared", "measured")
+    lines = {line[1].split()[0]: line for table in tables for line in table.rows}
+    assert lines["better"][2] == pytest.approx(1.0) and lines["worse"][2] == pytest.approx(25.0)
+    assert (lines["better"][6], lines["SNUG"][6]) == ("declared", "measured")
+    assert (lines["better"][0], lines["worse"][0]) == (1, 3)
+    assert {line[8] for name, line in lines.items() if name != "SNUG"} == {
+        "declared",
+        "verified from vertices",
+    }
     page = page_of(tmp_path / "in", "quick", published)
     assert "<script>window" not in page
     content = json.loads(re.search(r'id="content">(.*?)</script>', page, re.DOTALL)[1])
     assert f"better {NASTY}; they" in json.dumps(content, ensure_ascii=False)
+
+
+def test_scores_of_files_as_they_were_scored_are_marked_by_who_made_them(tmp_path, published):
+    folder, scores = write_entry(tmp_path, "mine", 2.0), RunFolder(tmp_path / "mine" / "scores")
+    (folder / "x.npz").write_text("frames")
+    config = scores.read_config() | {
+        "entry": {"x.npz": digest_of_file(folder / "x.npz")},
+        "commit": "abc",
+    }
+    config |= {"date": "2026-11-29", "roll_outs": {"a-seed0": "12"}}
+    for program, proof in (("", "files only"), ("method.py", "verified from vertices")):
+        url = {"url": "https://example.org/mine"}
+        scores.write_config(config | {"metadata": config["metadata"] | url | {"program": program}})
+        (scores.path / "picture.png").write_bytes(b"png")
+        cells, title = of_entry(folder).cells(), of_entry(folder).title_cell()
+        assert cells[8:11] == (proof, "abc", "2026-11-29") and len(cells[11]) == 8
+        assert title[4:] == ["https://example.org/mine", "data:image/png;base64,cG5n"]
+    (folder / "x.npz").write_text("other frames")
+    assert of_entry(folder).cells()[8] == "declared"
 
 
 def test_scores_of_another_entry_or_of_none_are_refused_with_what_to_do(tmp_path, published):

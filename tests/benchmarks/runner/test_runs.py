@@ -36,7 +36,7 @@ def words_of(folder: Path, methods: str) -> list[str]:
 def test_a_second_run_in_the_same_folder_is_refused_in_one_line(tmp_path, monkeypatch, capsys):
     options, answers = words_of(tmp_path / "run", "simulation"), []
 
-    def execute(plan, assets, *, report):
+    def execute(plan, assets):
         if not answers:
             answers.append(None)
             answers.append(run.main(options))
