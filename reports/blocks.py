@@ -7,7 +7,7 @@ A new figure is a function of reports.figures.charts and a line here.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from textwrap import shorten
 
@@ -29,7 +29,7 @@ class Report:
 
     run: Run
     tables: Mapping[str, Table]
-    pictures: Mapping[str, Sequence[Picture]]
+    pictures: Mapping[str, Picture]
 
     @property
     def subtitle(self) -> str:

@@ -10,23 +10,21 @@ from collections.abc import Iterator, Sequence
 
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command_line import Parser, command
-from reports.comparison import BETTER, FAILING, GONE, OTHER, WORSE, Comparison, compare
+from reports.comparison import HEADLINE, Comparison, compare
 from reports.finished_run import Run, read_run
+from reports.scene_changes import BETTER, FAILING, GONE, OTHER, WORSE
+from reports.statistics.relative_excess import RELATIVE_EXCESS
+from reports.text.text_table import markdown_table
 
 EXAMPLES = """examples:
-  python -m reports.compare before after
+  python -m reports.compare before after                         chief metrics of each method; what is worse
+  python -m reports.compare before after --metrics '*'           each change in a line
   python -m reports.compare before after --metrics 'energy/*,curvature/*' --methods snug
   python -m reports.compare before after --without-times         beside other work on the machine
   python -m reports.compare before after --shared                of what both runs have
 
-What counts as a change (docs/outputs.md has the rules in full):
-  a mean   beyond 2 % of an energy and 5 % of another answer, with p below 0.05 by Holm
-           and beyond the uncertainties of both runs; of a garment also motion by motion
-  a time   repeated: all of its interval beyond 15 %, on the same hardware; once: a factor of 2
-  a check  one that passes in one run alone, or is off by more than A's tolerance
-  a cell   one that comes to its end in one run alone
-  a loss   methods, motions, seeds and metrics that A has and B has not
-A network with one seed in B and more in A is judged by the prediction interval of A's seeds.
+A mean of an answer has changed beyond 2 or 5 % and the noise of both runs, with p below 0.05; rules of times,
+checks, single motions and single seeds: docs/outputs.md.
 
 exit status: 0 nothing is worse or gone; 1 something is; 2 a folder is no run, or its results.csv is not of
   the digest in run.json, or the two share nothing or differ in preset, sizes, body or garment."""
@@ -43,27 +41,48 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("one", metavar="A", help="folder of the earlier run")
     parser.add_argument("other", metavar="B", help="folder of the later run")
     for name in ("metrics", "methods"):
-        parser.add_argument(f"--{name}", metavar="NAME,...", default="*", help="only these (patterns)")
+        parser.add_argument(
+            f"--{name}", metavar="NAME,...", help="only these (patterns), each change in a line"
+        )
     parser.add_argument("--without-times", action="store_true", help="neither run times nor memory")
     parser.add_argument("--shared", action="store_true", help="leave out what B lacks")
     options = parser.parse_args(arguments)
     one, other = (read_run(RunFolder(path)) for path in (options.one, options.other))
     comparison = compare(
-        one, other, options.metrics, options.methods,
+        one, other, options.metrics or "*", options.methods or "*",
         times=not options.without_times, shared=options.shared,
     )  # fmt: skip
-    for change in comparison.changes:
+    changes = list(comparison.changes)
+    if short := not (options.metrics or options.methods):
+        print("\n".join(_headline(comparison, one)))
+        changes = [c for c in changes if c.verdict == WORSE and c.metric not in HEADLINE]
+    for change in changes[: MOST_CHANGES if short else None]:
         print(f"{change.verdict:8}{change.place}  {change.method}  {change.metric}  {change.size}")
     print("\n".join(_summary(comparison, (one, other))))
+    if short and comparison.changes:
+        print("Each change: --metrics '*'")
     return 1 if any(change.verdict in FAILING for change in comparison.changes) else 0
+
+
+MOST_METHODS, MOST_CHANGES = 16, 8  # lines without --metrics or --methods
+
+
+def _headline(comparison: Comparison, run: Run) -> Iterator[str]:
+    """Yield the table of the chief metrics of each method, the first of them."""
+    if not comparison.headline:
+        return
+    metrics = {RELATIVE_EXCESS.name: RELATIVE_EXCESS, **run.metrics}
+    heads = [metrics[name].heading if name in metrics else name for name in HEADLINE]
+    rows = [[run.label(name), *cells] for name, cells in comparison.headline.items()]
+    yield markdown_table([["Method", *heads], *rows[:MOST_METHODS]])
+    if (rest := len(rows) - MOST_METHODS) > 0:
+        yield f"{rest} more methods: --methods '*'"
 
 
 def _summary(comparison: Comparison, runs: Sequence[Run]) -> Iterator[str]:
     order = (GONE, WORSE, BETTER, OTHER)
     counts = [f"{sum(c.verdict == v for c in comparison.changes)} {v}" for v in order]
     yield f"{comparison.compared} means compared: {', '.join(counts)}."
-    if count := comparison.not_judged:
-        yield f"Not judged: {count} means differ, but have one seed or were timed once."
     machines = [", ".join(sorted(set(run.frame["hardware"]))) for run in runs]
     if machines[0] != machines[1]:
         yield f"No times compared: A ran on {machines[0]}, B on {machines[1]}."

@@ -1,19 +1,13 @@
-"""Comparison of two runs: changes beyond the noise of both, by garment and by scene, and what is gone.
-
-A network is tested in each scene over its seeds. Three seeds say little of their scatter, so the scatter
-is pooled over the scenes of the method. A scene that scatters more has its own; one that scatters far more
-stays out of the pool. The test is Student's with the pooled degrees of freedom, by Bonferroni for all these
-tests. A method without seeds is compared with the noise of the reference.
-"""
+"""Comparison of two runs: changes of means beyond the noise of both, and what is gone."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from benchmarks.metric import Metric
@@ -21,215 +15,44 @@ from benchmarks.results.protocol import LEVEL, one_protocol
 from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import OF_SCENES
 from reports.finished_run import Run
+from reports.scene_changes import (
+    BETTER,
+    GONE,
+    OTHER,
+    SPREADS,
+    TIME_TOLERANCE,
+    WORSE,
+    Change,
+    changed_scenes,
+    side,
+    size_of,
+    within_tolerance,
+)
 from reports.statistics.effects import DIFFERENCE, RATIO, Effect, effect
-from reports.statistics.means_and_spreads import AT_REFERENCE, Mean, means
-from reports.statistics.pareto import REPEATS, TIME, WHOLE
-from reports.statistics.relative_excess import relative_metric, with_relative_excess
+from reports.statistics.means_and_spreads import Mean, means, value_of
+from reports.statistics.pareto import NETWORK, REPEATS, TIME, WHOLE
+from reports.statistics.relative_excess import (
+    RELATIVE_EXCESS,
+    excess_of,
+    relative_metric,
+    with_relative_excess,
+)
 from reports.statistics.verdicts import effect_of, holm
-from reports.tables.table import number, with_spread
+from reports.tables.table import DASH, number
 
-GONE, WORSE, BETTER, OTHER = "gone", "worse", "better", "changed"  # verdicts, the first two fail
-FAILING = (GONE, WORSE)
-ENERGY_TOLERANCE = 0.02  # share of an energy
-TOLERANCE = 0.05  # share of any other answer
-TIME_TOLERANCE = 0.15  # share of a time or memory that was repeated
 ONCE = 2.0  # factor of a time that was taken once: below it another load of the machine may be the cause
-# share of the median method's value; a smaller difference is none, whatever it is a share of
-FLOOR = 1e-4
 WORST = "cost/frame_worst"  # the time of one frame, which anything else on the machine may have delayed
-SPREADS = 3.0  # times the reference's noise, beyond which an answer that nothing repeats has changed
-
-
-@dataclass(frozen=True)
-class Change:
-    """One line of a comparison.
-
-    Attributes:
-        verdict: GONE, WORSE, BETTER or OTHER.
-        place: garment or scene.
-        method: name of the method.
-        metric: name of the metric.
-        size: the change in words.
-    """
-
-    verdict: str
-    place: str
-    method: str
-    metric: str
-    size: str
-
-
-def tolerance_of(metric: Metric) -> float:
-    """Return the share of a number up to which another one counts as equal.
-
-    >>> tolerance_of(Metric(name="energy/strain", unit="J", title="Strain", definition=""))
-    0.02
-    """
-    if metric.of == "machine":
-        return TIME_TOLERANCE
-    of_energy = metric.name.startswith(("energy/", "relative_excess/"))
-    return ENERGY_TOLERANCE if of_energy else TOLERANCE
-
-
-def side(metric: Metric, before: float, after: float, difference: float) -> str:
-    """Return whether a difference of that sign is worse or better, or just another number.
-
-    What neither side of is better is worse farther from the value that the reference itself has.
-    """
-    if metric.lower_is_better is not None:
-        return WORSE if bool(difference > 0.0) is metric.lower_is_better else BETTER
-    known = 1.0 if metric.name.endswith("correlation") else None
-    best = AT_REFERENCE.get(metric.name.replace("/common_", "/"), known)
-    if best is None:
-        return OTHER
-    return WORSE if abs(after - best) > abs(before - best) else BETTER
-
-
-def size_of(metric: Metric, mean: Mean, new: Mean, far: Effect, p: float | None) -> str:
-    """Return a change as "0.21 ± 0.010 -> 0.26 ± 0.010 J, × 1.24 (1.20 to 1.28), p 0.0030"."""
-    before, after = (with_spread(m.value, m.spread_or_uncertainty) for m in (mean, new))
-    text = (
-        f"{before} -> {after}{_unit(metric)}, {'×' if far.scale == RATIO else 'by'} {number(far.shown)}"
-    )
-    if far.interval:
-        text += f" ({' to '.join(number(end) for end in far.interval)})"
-    return text + ("" if p is None else f", p {number(p, 2)}")
-
-
-def _unit(metric: Metric) -> str:
-    return "" if metric.unit == "1" else f" {metric.unit}"
-
-
-def within_tolerance(metric: Metric, mean: Mean, new: Mean, far: Effect, scale: float) -> bool:
-    """Return whether a change of means is too small to be one.
-
-    Args:
-        metric: of the means.
-        mean: the earlier one.
-        new: the later one.
-        far: the effect of the later against the earlier one.
-        scale: the median method's value there; unit of a difference whose unit is unknown.
-    """
-    if abs(new.value - mean.value) <= FLOOR * scale:
-        return True
-    share = tolerance_of(metric)
-    if far.scale == DIFFERENCE:
-        return abs(far.value) <= share * (far.unit or scale)
-    return max(far.shown, 1.0 / far.shown) <= 1.0 + share if far.shown > 0.0 else False
-
-
-ODD = 3.0  # times the median scatter of scenes, beyond which a scene is left out of the pooled scatter
-NETWORK_METRIC = ["method", "metric"]
-
-
-def changed_scenes(one: pd.DataFrame, other: pd.DataFrame, metrics: dict[str, Metric]) -> list[Change]:
-    """Return the changes of single scenes.
-
-    Args:
-        one: rows of the earlier run: scene, method, seed, metric, value, uncertainty, seeded.
-        other: rows of the later run, of the same cells.
-        metrics: by name. Times and memory are left out.
-    """
-    from scipy import stats
-
-    answers = [name for name, metric in metrics.items() if metric.of != "machine"]
-    frame = pd.concat([one.assign(run=0), other.assign(run=1)], ignore_index=True)
-    frame = frame[frame["metric"].isin(answers)].astype(dict.fromkeys((*NETWORK_METRIC, "scene"), str))
-    # One seed says nothing of how seeds scatter.
-    seeds = frame.groupby(NETWORK_METRIC)["seed"].transform("nunique")
-    frame = frame[~frame["seeded"] | (seeds > 1)]
-    if frame.empty:
-        return []
-    groups = frame.groupby(NETWORK_METRIC, sort=False)
-    rows = pd.concat([_differences(metrics[name], of_group) for (_, name), of_group in groups])
-    tests = max(int((rows["error"] > 0.0).sum()), 1)
-    beyond = rows["error"] * stats.t.isf(LEVEL / 2.0 / tests, rows["freedom"])
-    rows = rows[rows["far"].abs() > np.maximum(rows["least"], beyond)]
-    return [
-        Change(
-            side(metrics[row.metric], row.before, row.after, row.far), row.scene, row.method, row.metric,
-            f"{number(row.before)} -> {number(row.after)}{_unit(metrics[row.metric])}",
-        )
-        for row in rows.itertuples()
-    ]  # fmt: skip
-
-
-def _differences(metric: Metric, rows: pd.DataFrame) -> pd.DataFrame:
-    """Return for each scene of one method the difference of the later run from the earlier.
-
-    before, after: means over seeds. far: the difference on the scale, of logarithms where all values are
-    positive, else plain. least: the largest one on that scale that is no change. error: its standard
-    error, 0 without seeds. freedom: degrees of freedom of the error.
-    """
-    values, run = rows["value"].to_numpy(), rows["run"].to_numpy()
-    relative = metric.name.startswith("relative_excess/")
-    signed = relative or metric.arbitrary_zero or metric.name.endswith("correlation")
-    positive = not signed and values.min() > 0.0
-    scaled = np.log(values) if positive else values
-    places, scenes = pd.factorize(rows["scene"], sort=True)
-    cells = 2 * places + run
-    counts = np.bincount(cells)
-
-    def means_of(numbers: np.ndarray) -> np.ndarray:
-        """Return (2,scenes): mean over the seeds of either run."""
-        return (np.bincount(cells, numbers) / counts).reshape(-1, 2).T
-
-    (old, new), (before, after) = means_of(values), means_of(scaled)
-    draws = pd.factorize(rows["seed"] * 2 + run)[0]
-    scatter, freedom = _scatter(scaled - np.stack([before, after])[run, places], places, draws)
-    median = float(np.median(np.abs(old)))
-    moved = SPREADS * np.hypot(*means_of(rows["uncertainty"].fillna(0.0).to_numpy()))
-    share = tolerance_of(metric)
-    if positive:
-        least = np.maximum(math.log1p(share), np.log1p((FLOOR * median + moved) / old))
-    else:
-        unit = 100.0 if relative else np.maximum(np.abs(old), median)
-        least = np.maximum(np.maximum(share * unit, FLOOR * median), moved)
-    error = scatter * np.sqrt((1.0 / counts).reshape(-1, 2).sum(axis=1))
-    return pd.DataFrame({
-        "scene": scenes, "method": rows["method"].iloc[0], "metric": metric.name, "before": old, "after": new,
-        "far": after - before, "least": least, "error": error, "freedom": freedom,
-    })  # fmt: skip
-
-
-def _scatter(residuals: np.ndarray, places: np.ndarray, draws: np.ndarray) -> tuple[np.ndarray, float]:
-    """Return the standard deviation over seeds in each scene, at least the pooled one, and its freedom.
-
-    Args:
-        residuals: (N,) values less the mean over the seeds of their scene and run.
-        places: (N,) numbers of their scenes.
-        draws: (N,) numbers of their trainings, each a seed of a run.
-
-    A seed may move all scenes alike. With correlation rho between S scenes, the pooled variance has
-    1 + (S - 1) rho^2 times fewer degrees of freedom than with independent scenes.
-    """
-    squares, freedom = np.bincount(places, residuals**2), np.bincount(places) - 2
-    if not freedom.any() or not squares.any():
-        return squares * 0.0, math.inf
-    spread = np.sqrt(squares / np.maximum(freedom, 1))
-    pool = (freedom > 0) & (spread <= ODD * np.median(spread[freedom > 0]))
-    if not squares[pool].any():
-        pool = freedom > 0
-    total = float(freedom[pool].sum())
-    pooled = float(squares[pool].sum()) / total
-    scenes, kept = int(pool.sum()), pool[places]
-    of_draws = np.bincount(draws[kept], residuals[kept]) / np.maximum(np.bincount(draws[kept]), 1)
-    common = float((of_draws**2).sum()) / (draws.max() - 1)
-    rho = (scenes * common / pooled - 1.0) / (scenes - 1) if scenes > 1 else 0.0
-    total /= 1.0 + (scenes - 1) * min(max(rho, 0.0), 1.0) ** 2
-    return np.maximum(spread, math.sqrt(pooled)), total
-
-
 CELL = ["scene", "method", "seed", "metric"]
 
 
-def gone(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
-    """Return a line for each method, and each metric of one, that the later run lacks somewhere.
+def _shared(frames: Sequence[pd.DataFrame], *columns: str) -> list[pd.DataFrame]:
+    """Return the rows of both frames whose values in these columns the other has too."""
+    keys = [frame.set_index(list(columns)).index for frame in frames]
+    return [frame[key.isin(rest)] for frame, key, rest in zip(frames, keys, reversed(keys))]
 
-    Args:
-        one: rows of the earlier run, with the columns of CELL and `place`.
-        other: rows of the later run.
-    """
+
+def gone(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
+    """Return a line for each method, and each metric of one, that the later run lacks somewhere."""
     keys = [frame.set_index(CELL).index for frame in (one, other)]
     missing = one[~keys[0].isin(keys[1])].astype({"method": str, "metric": str})
     lacking = missing.set_index(CELL[:3]).index.isin(other.set_index(CELL[:3]).index)
@@ -280,12 +103,12 @@ class Comparison:
     Attributes:
         changes: what is gone and worse first.
         compared: number of means.
-        not_judged: number of means that differ and have one seed, or are times that were taken once.
+        headline: method -> for each metric of HEADLINE both means with the verdict, SNUG first.
     """
 
     changes: tuple[Change, ...]
     compared: int
-    not_judged: int
+    headline: dict[str, list[str]]
 
 
 def compare(
@@ -326,8 +149,7 @@ def compare(
         machines = [m.name for run in (one, other) for m in run.metrics.values() if m.of == "machine"]
         of_metrics = [frame[~frame["metric"].isin(machines)] for frame in of_metrics]
     lost = [] if shared else gone(*of_metrics)
-    keys = [frame.set_index(CELL).index for frame in of_metrics]
-    kept = [frame[key.isin(rest)] for frame, key, rest in zip(of_metrics, keys, reversed(keys))]
+    kept = _shared(of_metrics, *CELL)
     if kept[0].empty:
         raise ResultsError(
             "the two runs share no such scene, method, seed and metric: nothing to compare"
@@ -343,14 +165,52 @@ def compare(
     drawn = _of_one_seed(*of_metrics)
     alone = set(drawn[1]["method"])
     kept = [frame[~(frame["seeded"] & frame["method"].isin(alone))] for frame in kept]
-    judged, compared, not_judged = _means(one, *_without_more_noise(*kept), basis=cells[0])
+    judged, compared = _means(one, *_without_more_noise(*kept), basis=cells[0])
     earlier, later = _with_known_zero(one, *drawn, basis=cells[0])
     of_one_seed = changed_scenes(earlier, later, _metrics(one))
     order = (GONE, WORSE, BETTER, OTHER)
     changes = sorted(
         [*lost, *ended, *judged, *of_one_seed], key=lambda change: order.index(change.verdict)
     )
-    return Comparison(tuple(changes), compared, not_judged)
+    return Comparison(tuple(changes), compared, _headline(one, of_metrics, changes))
+
+
+HEADLINE = (
+    RELATIVE_EXCESS.name, "dynamics/correlation", "penetration/surface", "curvature/histogram", WHOLE,
+)  # fmt: skip
+
+
+def _headline(
+    run: Run, frames: Sequence[pd.DataFrame], changes: Sequence[Change]
+) -> dict[str, list[str]]:
+    """Return the rows of Comparison.headline, on the scenes of the first garment that both runs have."""
+    garment = run.first_garment
+    usable = [f[f["usable"] & (f["place"] == garment) & (f["case"] == "")] for f in frames]
+    worn = _shared(usable, "scene", "method", "metric")
+    shown = run.ordered(set(worn[0]["method"]) - run.twins - set(run.with_role("reference-variant")))
+    rows = {}
+    for method in sorted(shown, key=lambda name: name != NETWORK):
+        seeds = [set(f[(f["method"] == method) & f["seeded"]]["seed"]) for f in worn]
+        verdict = "one seed" if len(seeds[0]) == len(seeds[1]) == 1 else "same"
+        cells = []
+        for metric in HEADLINE:
+            before, after = (_value(run, frame, method, metric) for frame in worn)
+            found = {c.place: c.verdict for c in changes if (c.method, c.metric) == (method, metric)}
+            scenes = " and ".join(sorted({f"{change} in a scene" for change in found.values()}))
+            said = found.get(garment) or scenes or verdict
+            known = before is not None and after is not None
+            cells.append(f"{number(before)} → {number(after)} {said}" if known else DASH)
+        if set(cells) != {DASH}:
+            rows[method] = cells
+    return rows
+
+
+def _value(run: Run, rows: pd.DataFrame, method: str, metric: str) -> float | None:
+    """Return a mean as page one has it: of relative excess the typical one."""
+    if metric != RELATIVE_EXCESS.name:
+        return value_of(rows, method, metric)
+    excess = excess_of(run, rows, method) if method != run.reference else None
+    return excess.typical if excess else None
 
 
 def _of_one_seed(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:
@@ -362,8 +222,7 @@ def _of_one_seed(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:
     before, after = (frame.groupby("method", observed=True)["seed"].nunique() for frame in rows)
     alone = [name for name in after.index[after == 1] if before.get(name, 0) > 1]
     rows = [frame[frame["method"].isin(alone)] for frame in rows]
-    keys = [frame.set_index(["scene", "method", "metric"]).index for frame in rows]
-    return [frame[key.isin(rest)] for frame, key, rest in zip(rows, keys, reversed(keys))]
+    return _shared(rows, "scene", "method", "metric")
 
 
 def _without_more_noise(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:
@@ -415,8 +274,8 @@ def _matching(names: pd.Series, patterns: str) -> pd.Series:
 
 def _means(
     run: Run, one: pd.DataFrame, other: pd.DataFrame, *, basis: pd.DataFrame
-) -> tuple[list[Change], int, int]:
-    """Return changes, number of means, and number of those that differ and cannot be judged.
+) -> tuple[list[Change], int]:
+    """Return changes, and the number of means.
 
     basis: all rows of the earlier run, whatever methods and metrics are compared.
     """
@@ -434,14 +293,13 @@ def _means(
     ]
     p_values = [far.p_value() for *_, far in judged]
     corrected = iter(holm([p for p in p_values if p is not None]))
-    changes, not_judged = [], len(differ) - len(judged)
+    changes = []
     for (place, method, metric, mean, new, far), alone in zip(judged, p_values):
         p = None if alone is None else next(corrected)
         if within_tolerance(metric, mean, new, far, float(scales[place, metric.name])):
             continue
         if metric.of == "machine" and mean.uncertainty is None and mean.seeds < 2:
             if far.scale == RATIO and max(far.shown, 1.0 / far.shown) < ONCE:
-                not_judged += 1
                 continue
         elif not _beyond_noise(metric, far, p):
             continue
@@ -455,7 +313,7 @@ def _means(
     before, after = (frame[frame["scene"].isin(garments)] for frame in rows)
     of_scenes = changed_scenes(before, after, known)
     changes += [c for c in of_scenes if (garments[c.place], c.method, c.metric) not in reported]
-    return changes, len(first), not_judged
+    return changes, len(first)
 
 
 def _with_known_zero(run: Run, *frames: pd.DataFrame, basis: pd.DataFrame) -> list[pd.DataFrame]:
@@ -499,9 +357,7 @@ def _beyond_noise(metric: Metric, far: Effect, p: float | None) -> bool:
 
 def _over_the_same(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:
     """Return the usable rows of both, without cases, of scenes that have all seeds of their group."""
-    rows = [frame[frame["usable"] & (frame["case"] == "")] for frame in (one, other)]
-    keys = [frame.set_index(CELL).index for frame in rows]
-    rows = [frame[key.isin(rest)] for frame, key, rest in zip(rows, keys, reversed(keys))]
+    rows = _shared([f[f["usable"] & (f["case"] == "")] for f in (one, other)], *CELL)
     whole = [
         frame.groupby([*GROUP, "scene"])["seed"].transform("nunique")
         == frame.groupby(GROUP)["seed"].transform("nunique")

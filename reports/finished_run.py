@@ -183,11 +183,6 @@ class Run:
         """Simulations as valid as the reference, which only show its noise: no rows of tables and figures."""
         return {*SECOND_STARTS, "simulation-refrozen", "simulation-1e-8"} & self.methods.keys()
 
-    @property
-    def one_seed(self) -> bool:
-        """Whether no method of the run has a second seed."""
-        return bool(self.frame["seed"].nunique() == 1)
-
     def label(self, method: str) -> str:
         """Return the method's name for people."""
         return self.methods[method].label if method in self.methods else method

@@ -54,7 +54,8 @@ FEW = 5  # up to so many columns, the columns of a table share its width evenly
 def lay_out(report: Report, block: Figure | TableBlock) -> list[Values]:
     """Return the values of a block, none where the report has no content for it."""
     if isinstance(block, Figure):
-        return [_figure(picture) for picture in report.pictures.get(block.name, ())]
+        picture = report.pictures.get(block.name)
+        return [_figure(picture)] if picture else []
     if block.name not in report.tables:
         return []
     table = block.printed(report.tables[block.name])

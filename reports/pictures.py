@@ -233,7 +233,7 @@ def _composed(selected: SceneRollOuts, pictures: np.ndarray, frame: int, time: f
     return np.asarray(image)
 
 
-def side_by_side(run: Run) -> Iterator[Drawing]:
+def side_by_side(run: Run) -> Drawing | None:
     """Draw the methods of page one at one frame of the first whole motion that kept their roll-outs.
 
     Those that ended early are left out.
@@ -247,8 +247,8 @@ def side_by_side(run: Run) -> Iterator[Drawing]:
         whole = {name: cloth for name, cloth in cloths.items() if cloth and cloth.frames == most}
         if whole:
             labels = {name: run.label(name) for name in whole}
-            yield _still(SceneRollOuts(scene, whole, run.roll_outs.body(scene), labels))
-            return
+            return _still(SceneRollOuts(scene, whole, run.roll_outs.body(scene), labels))
+    return None
 
 
 def _still(selected: SceneRollOuts) -> Drawing:

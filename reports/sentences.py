@@ -96,7 +96,7 @@ def _certainty(run: Run, worn: pd.DataFrame) -> str:
     sentences = []
     if counted_claims := counts(judged(run)):
         tests = f"{counted_claims.total()} test{'' if counted_claims.total() == 1 else 's'}"
-        published = published_verdicts() if run.one_seed else ""
+        published = published_verdicts() if run.frame["seed"].nunique() == 1 else ""
         beside = f" with one seed; in the published run {published}" if published else ""
         sentences.append(f"Of {tests} of primary claims of the paper {in_words(counted_claims)}{beside}.")
     distance, curvature = (indistinct(run, worn, metric) for metric in (DISTANCE, CURVATURE))

@@ -16,8 +16,9 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.results.run_folder import RunFolder
-from reports.comparison import FAILING, Change, compare
+from reports.comparison import compare
 from reports.finished_run import Run, read_run
+from reports.scene_changes import FAILING, Change
 
 
 @dataclass(frozen=True)

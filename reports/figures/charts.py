@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -164,7 +164,7 @@ def _draw_marker(axes: Axes, point: Point, marker: str, colour: str, *, pale: bo
     )
 
 
-def error_of_page_one(run: Run) -> Iterator[Drawing]:
+def error_of_page_one(run: Run) -> Drawing | None:
     """Draw an error of the leading scene in one wide panel: the first that tells two methods apart."""
     frame, scenes = compared_cells(run)
     for scene in scenes:
@@ -173,8 +173,8 @@ def error_of_page_one(run: Run) -> Iterator[Drawing]:
             points = error_points(run, rows, name)
             band = indistinct(run, rows, name)
             if sum(point.error > _least(points, band) for point in points) > 1:
-                yield _draw_page_one(run, rows, run.metrics[name], points, band)
-                return
+                return _draw_page_one(run, rows, run.metrics[name], points, band)
+    return None
 
 
 def _draw_page_one(
@@ -210,12 +210,12 @@ TERMS = ("strain", "bending", "inertia")
 LEAST = 1e-4  # of the largest energy that is shown: frames at rest would squeeze the rest
 
 
-def energy_series(run: Run) -> Iterator[Drawing]:
+def energy_series(run: Run) -> Drawing | None:
     """Draw a panel for each term of one whole motion, a curve per method (the paper's figure 4)."""
     scene, frames = _frames(run)
     terms = [term for term in TERMS if term in frames and frames[term].notna().any()]
     if not terms:
-        return
+        return None
     have = set(frames.dropna(subset=terms, how="all")["method"])
     methods = leads(run, run.frame[run.frame["method"].isin(have)])
     curves = {method: frames[frames["method"] == method] for method in methods}
@@ -235,7 +235,7 @@ def energy_series(run: Run) -> Iterator[Drawing]:
     caption = (
         f"{scene}: energy of each frame by term, logarithmic. A frame with no energy at all is a gap."
     )
-    yield Drawing(figure, f"energy_series_{file_name(scene)}", caption)
+    return Drawing(figure, f"energy_series_{file_name(scene)}", caption)
 
 
 def _frames(run: Run) -> tuple[str, pd.DataFrame]:

@@ -44,7 +44,6 @@ class Style:
 KNOWN = {
     "simulation": Style("", "#000000", "*"),
     "simulation-perturbed": Style("", "#444444", "x", "--"),
-    "direct-optimisation": Style("", "#5D3A9B", "_", "--"),
     "skinning": Style("", "#8C8C8C", "D", "--"),
     "untrained": Style("", "#56B4E9", "v", ":"),
     "pbns": Style("", "#009E73", "^", "-."),
@@ -68,8 +67,6 @@ KNOWN = {
     "simulation-tolerance": Style("Simulation to a tolerance", "#555555", "*"),
     "simulation-dt": Style("Simulation with smaller steps", "#882255", "*"),
 }
-# Members of a family share its colour. Iterations go by doubling: four in a row have four lines.
-_DASHES: tuple[Line, ...] = ((0.0, (8.0, 1.5)), "--", "-.", ":")
 _SPARE = ("#999933", "#661100", "#AA4499", "#117733", "#88CCEE", "#DDCC77")
 _SPARE_MARKERS = ("h", "8", "d", "v", "p")
 
@@ -97,12 +94,9 @@ def family_style(run: Run, method: ReportedMethod) -> Style:
 
 
 def style(run: Run, method: str) -> Style:
-    """Return the style of one method, with its own label and, in a family, its own line."""
+    """Return the style of one method: that of its family with its own label."""
     declared = run.methods[method]
-    plain = replace(family_style(run, declared), label=declared.label)
-    if declared.level is None or declared.level < 1.0:
-        return plain
-    return replace(plain, line=_DASHES[int(declared.level).bit_length() % len(_DASHES)])
+    return replace(family_style(run, declared), label=declared.label)
 
 
 PAGE_WIDTH = 6.7  # inches of text width on the report's page
@@ -277,16 +271,18 @@ class Figure:
         return sorted(path for path in folder.glob(f"{self.name}*") if path.suffix in (".png", ".svg"))
 
 
-def draw_figures(run: Run, folder: Path, figures: Iterable[Figure]) -> Mapping[str, list[Picture]]:
-    """Draw into the folder all that the run has the data for; return name of the figure -> its pictures.
+def draw_figures(run: Run, folder: Path, figures: Iterable[Figure]) -> Mapping[str, Picture]:
+    """Draw into the folder all that the run has the data for; return name of the figure -> its picture.
 
     What cannot be drawn is taken from the folder if it lies there.
     """
-    return {
-        figure.name: [save_drawing(folder, drawing) for drawing in figure.drawings(run)]
-        or [kept_picture(path) for path in figure.files_in(folder) if path.suffix == ".png"]
-        for figure in figures
-    }
+    pictures = {}
+    for figure in figures:
+        if drawing := figure.draw(run):
+            pictures[figure.name] = save_drawing(folder, drawing)
+        elif kept := [path for path in figure.files_in(folder) if path.suffix == ".png"]:
+            pictures[figure.name] = kept_picture(kept[0])
+    return pictures
 
 
 def save_drawing(folder: Path, drawing: Drawing) -> Picture:

@@ -10,7 +10,6 @@ reference has. Any other energy whose zero is a choice, as gravity, is divided b
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from operator import itemgetter
@@ -19,7 +18,6 @@ import numpy as np
 import pandas as pd
 
 from benchmarks.metric import Metric
-from benchmarks.results.protocol import SOFTENING
 from reports.finished_run import Run
 from reports.statistics.effects import (
     EXCESS,
@@ -143,17 +141,6 @@ class Excess:
     def typical(self) -> float:
         """Mean on the scale of effects.EXCESS, taken back: about the geometric mean over motions."""
         return self.effect.shown
-
-    @property
-    def uncertainty(self) -> float:
-        """Noise of the typical value, of what the start of the reference changes."""
-        return self.effect.uncertainty * math.hypot(SOFTENING, self.typical)
-
-    @property
-    def mean(self) -> float:
-        """Arithmetic mean over recordings, of a recording over its segments."""
-        cells = {(scene, 0): value for scene, value in self.by_motion.items()}
-        return float(np.mean(list(mean_by_recording(cells).values())))
 
     def typical_of(self, *, recorded: bool) -> float | None:
         """Return the typical value of recorded motions alone, or of the others alone; None without any."""

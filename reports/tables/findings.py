@@ -22,7 +22,7 @@ from reports.statistics.relative_excess import (
     with_relative_excess,
 )
 from reports.statistics.verdicts import OPEN, measure_of, standing, why_open
-from reports.tables.table import GARMENT, METHOD, SCENE, SUITE, Cell, Column, Table, table
+from reports.tables.table import GARMENT, METHOD, SCENE, SUITE, Cell, Column, Table, scene_in_words, table
 
 # The rule of verdicts (reports.statistics.verdicts) in a note.
 VERDICTS = (
@@ -67,8 +67,8 @@ def findings(run: Run) -> list[Table]:
 
 EXCESS_NOTE = (
     "Typical: mean over motions and seeds of arcsinh(x / 1 %), taken back: a geometric mean well above 1 %, "
-    "arithmetic well below. Segments of a recording count as one motion. Uncertain by: the noise, of what "
-    f"the start of the reference changes. {VERDICTS}"
+    "arithmetic well below. Segments of a recording count as one motion. "
+    f"{VERDICTS}"
 )
 
 
@@ -87,13 +87,13 @@ def relative_excess(run: Run) -> list[Table]:
         GARMENT, METHOD, Column("own", "In own energies", "%", digits=2),
         Column("typical", "Typical", "%", digits=2), Column("recorded", "Recorded", "%", digits=2),
         Column("others", "Others", "%", digits=2), Column("pooled", "Pooled", "%", digits=2),
-        Column("mean", "Mean", "%", digits=2), Column("worst", "Worst", "%", digits=2),
-        Column("worst_motion", "Worst motion", text=True), Column("uncertain_by", "Uncertain by", "%"),
+        Column("worst", "Worst", "%", digits=2),
+        Column("worst_motion", "Worst motion", text=True),
         Column("motions", "Motions"), Column("verdict", "Energy against the reference", text=True),
     )  # fmt: skip
     caption = (
         "Relative excess, (E - E_reference) / (E_skinning - E_reference) of the total energy E. Typical "
-        "(geometric, with its interval) and mean: over independent sources and seeds. Recorded, others: "
+        "(geometric, with its interval): over independent sources and seeds. Recorded, others: "
         "typical of the library's recordings, and of other motions. Pooled: ratio of the sums over motions."
     )
     means = table("relative_excess", columns, lines, caption, grouped_by=("garment",), note=EXCESS_NOTE)
@@ -127,8 +127,7 @@ def _cells_of(excess: Excess) -> tuple[Cell, ...]:
     stands += why_open(excess.effect) if stands == OPEN else ""
     return (
         excess.effect, excess.typical_of(recorded=True), excess.typical_of(recorded=False), excess.pooled,
-        excess.mean, most, worst.partition("/")[2] or worst, excess.uncertainty or None,
-        len(excess.by_motion), stands,
+        most, scene_in_words(worst.partition("/")[2] or worst), len(excess.by_motion), stands,
     )  # fmt: skip
 
 

@@ -4,10 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import pandas as pd
-
 from reports.finished_run import Run
-from reports.statistics.effects import Effect
 from reports.statistics.means_and_spreads import mean_of, value_of
 from reports.statistics.outcomes import EXTERNAL, leads
 from reports.statistics.pareto import (
@@ -20,7 +17,6 @@ from reports.statistics.pareto import (
     run_time,
 )
 from reports.statistics.relative_excess import excess_of, own_excess_of, with_relative_excess
-from reports.statistics.verdicts import compare_methods
 from reports.tables.table import Cell, Column, Table, in_scenes, metric_column, table
 
 ROWS = 8
@@ -61,24 +57,22 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     asked = [(run.metrics[name], rows) for name, rows in wanted if name in run.metrics]
     with_excess = with_relative_excess(run, rows_of_garment)
     excess = {name: excess_of(run, with_excess, name) for name in chosen if name != run.reference}
-    faster = {name: _times_faster(run, timed, name) for name in chosen}
     own_excess = {name: own_excess_of(run, rows_of_garment, name) for name in excess}
-    shares: dict[str, tuple[Cell, Cell, Cell]] = {
-        name: (own_excess[name], of.effect, of.pooled) for name, of in excess.items() if of
+    shares: dict[str, tuple[Cell, Cell]] = {
+        name: (own_excess[name], of.effect) for name, of in excess.items() if of
     }
-    shares |= {run.reference: (0.0, 0.0, 0.0)} if shares else {}
+    shares |= {run.reference: (0.0, 0.0)} if shares else {}
     lines: list[tuple[Cell, ...]] = [
         (
-            method, *shares.get(method, (None, None, None)),
-            *(mean_of(rows, method, metric.name) for metric, rows in asked), faster[method],
+            method, *shares.get(method, (None, None)),
+            *(mean_of(rows, method, metric.name) for metric, rows in asked),
         )
         for method in chosen
     ]  # fmt: skip
     columns = [
         Column("own_excess", "Excess in own energies", "%", digits=2),
         Column("relative_excess", "Relative excess", "%", digits=2),
-        Column("pooled", "Pooled", "%", digits=2),
-        *(metric_column(metric) for metric, _ in asked), Column("faster", "Times faster"),
+        *(metric_column(metric) for metric, _ in asked),
     ]  # fmt: skip
     kept = [k for k in range(1, len(columns) + 1) if any(line[k] is not None for line in lines)]
     lines = [(line[0], *(line[k] for k in kept)) for line in lines]
@@ -86,23 +80,15 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     if not columns:
         return []
     of_motions = (
-        f"{garment}: excess as a geometric mean over independent sources, pooled as the ratio of sums over "
-        "motions, the rest as arithmetic means over motions. In own energies: over the minimum of what the "
-        "network was trained on, so how well it was trained; relative excess: by the energies that all are "
-        "compared by. A dash: trained on simulated vertices, or on energies without a minimum"
+        f"{garment}: excess as a geometric mean over independent sources, the rest as arithmetic means over "
+        "motions. In own energies: over the minimum of what the network was trained on, so how well it was "
+        "trained; relative excess: by the energies that all are compared by. A dash: trained on simulated "
+        "vertices, or on energies without a minimum"
     )
     caption = of_motions if garment else f"Means {in_scenes(scenes)}"
     caption += f"; run times (and energy gaps) {in_scenes(scenes)}." if garment and scenes else "."
     method = Column("method", "Method", text=True, method=True)
     return table("overview", (method, *columns), lines, caption)
-
-
-def _times_faster(run: Run, timed: pd.DataFrame, method: str) -> Effect | None:
-    """Return how many times as long as the method the reference takes, with the range."""
-    metric = run.metrics.get(run_time(timed))
-    if metric is None or method == run.reference:
-        return None
-    return compare_methods(run, timed, metric, run.reference, method).effect
 
 
 UNCERTAIN = ("curvature/histogram", "curvature/error", "distance/rms")

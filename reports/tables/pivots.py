@@ -144,14 +144,14 @@ def shapes(run: Run) -> list[Table]:
         all_means = means(part, "method", "metric")
         for method in methods:
             excess = None if method in (run.reference, SKINNING) else excess_of(run, part, method)
-            share = (excess.effect, excess.mean) if excess else (None, None)
-            lines.append((name, method, *share, *(all_means.get((method, m.name)) for m in metrics)))
+            share = excess.effect if excess else None
+            lines.append((name, method, share, *(all_means.get((method, m.name)) for m in metrics)))
     columns = (
         Column("scene", "Body", text=True), METHOD, Column("typical", "Typical", "%", digits=2),
-        Column("mean", "Mean", "%", digits=2), *map(metric_column, metrics),
+        *map(metric_column, metrics),
     )  # fmt: skip
     caption = (
         "Body shapes: the others together, and the mean body, in one motion. Typical (geometric, with its "
-        "interval over bodies and seeds) and mean: relative excess; energies and penetration: means."
+        "interval over bodies and seeds): relative excess; energies and penetration: means."
     )
     return table("shapes", columns, lines, caption)

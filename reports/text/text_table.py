@@ -64,7 +64,7 @@ def markdown_table(rows: Sequence[Sequence[str]]) -> str:
 
 COLUMNS = (
     "method", "relative_excess", "dynamics/correlation", "penetration/surface", "cost/whole", "cost/frame",
-    "gap/energy", "faster",
+    "gap/energy",
 )  # fmt: skip
 MOST_COLUMNS = 5  # of COLUMNS, without the intervals of effects
 

@@ -10,7 +10,8 @@ import pytest
 
 from benchmarks.results.row import ResultsError, Row
 from reports import compare as command
-from reports.comparison import FAILING, compare
+from reports.comparison import compare
+from reports.scene_changes import FAILING
 from tests.reports.report_folder import row, run_folder, run_of
 
 SCENES = tuple(f"tshirt/motion_{k}" for k in range(8))
@@ -229,11 +230,32 @@ def test_exit_status_and_lines(tmp_path, capsys):
     run_folder(tmp_path / "b", [times(1.3, **STRAIN)(given) for given in a_run(1)])
     one, worse = str(tmp_path / "a"), str(tmp_path / "b")
     assert command.main([one, one]) == 0 and "0 worse" in capsys.readouterr().out
-    assert command.main([one, worse]) == 1
+    assert command.main([one, worse, "--metrics", "*"]) == 1
     line = capsys.readouterr().out.splitlines()[0]
     assert line.startswith("worse   tshirt  snug  energy/strain  0.0")
     assert " J, × 1." in line and "p " in line
     assert command.main([worse, one]) == 0
+
+
+def test_the_chief_metrics_of_each_method_stand_in_few_lines_snug_first(tmp_path, capsys):
+    def inside(factor: float):
+        for s in SCENES:
+            for k in range(20):
+                yield row(s, f"solver-{k}", "penetration/surface", 3.0, unit="%", seeded=False)
+            yield row(
+                s, "snug", "penetration/surface", 2.0 * (factor if s == SCENES[0] else 1.0), unit="%"
+            )
+            yield row(s, "simulation", "penetration/surface", 1.0 * factor, unit="%")
+            yield from (row(s, "skinning", f"energy/t{m}", factor) for m in range(20))
+
+    run_folder(tmp_path / "a", list(inside(1.0)))
+    run_folder(tmp_path / "b", list(inside(4.0)))
+    assert command.main([str(tmp_path / "a"), str(tmp_path / "b")]) == 1
+    head, _, snug, simulation, solver, *rest = lines = capsys.readouterr().out.splitlines()
+    assert len(lines) <= 30 and "| Surface inside [%] |" in head
+    assert "| SNUG |" in snug and "2.00 → 2.75 one seed" in snug
+    assert "| 1.00 → 4.00 worse |" in simulation and "| 3.00 → 3.00 same |" in solver
+    assert rest[-1] == "Each change: --metrics '*'"
 
 
 @pytest.mark.parametrize(

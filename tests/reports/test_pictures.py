@@ -34,7 +34,7 @@ def run(tmp_path_factory) -> RunFolder:
 
 
 def test_the_still_has_what_came_to_its_end_at_the_liveliest_frame(run):
-    (drawing,) = side_by_side(read_run(run))
+    drawing = side_by_side(read_run(run))
     assert drawing.caption.startswith("tshirt: walk: frame 3, where ")
     assert drawing.canvas.get_figwidth() == pytest.approx(2 * pictures.WIDEST, abs=0.1)
 

@@ -155,8 +155,5 @@ def test_times_stand_as_published_and_as_measured():
     assert names[:5] == ["TailorNet"] * 3 + ["SNUG", "80 handles"] and "HyperBones" in names[5:]
     by_name = {row[0]: row for row in rows}
     assert by_name["SNUG"][1] == "2.2" and "table 3" in by_name["SNUG"][3]
-    assert by_name["SNUG"][4:6] == ["0.922", "0.409"] and by_name["80 handles"][1:4] == ["–"] * 3
-    assert by_name["HyperBones"][4:] == ["–"] * 3 and float(by_name["TailorNet"][6]) < float(
-        by_name["TailorNet"][4]
-    )
+    assert by_name["SNUG"][4:6] == ["0.922", "0.409"] and by_name["HyperBones"][4:] == ["–"] * 3
     assert all(row[3] != "–" for row in rows[1:] if row[1] != "–")  # no time without its source

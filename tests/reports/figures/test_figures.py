@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from reports.figures import plotting
-from reports.figures.charts import curves_of, draw_points
-from reports.figures.plotting import new_figure
+from reports.figures.charts import curves_of
 from reports.finished_run import shown_seeds
 from reports.statistics.pareto import Point
 from tests.reports.report_folder import row, run_of
@@ -17,7 +16,6 @@ def test_methods_keep_their_order_and_their_look():
     assert run.ordered(names) == known
     assert plotting.style(run, "newton-2").label == "Newton, 2 iterations"
     assert plotting.style(run, "newton-2").colour == plotting.style(run, "newton-4").colour
-    assert plotting.style(run, "newton-2").line != plotting.style(run, "newton-8").line
 
 
 def test_the_first_seed_that_came_to_its_end_is_shown():
@@ -49,12 +47,3 @@ def test_solvers_stopped_early_are_one_curve_and_variants_of_the_reference_stand
     assert started.look.colour == alone[0].look.colour != solvers.look.colour
     assert started.look.label == "SNUG + solver"
     assert len(curves("simulation-perturbed-1e-4")) == 1
-
-
-def test_points_at_or_below_the_simulation_are_named_not_drawn():
-    axes = new_figure(3, 3).subplots()
-    run = run_of([row(method=method) for method in ("snug", "newton-8")])
-    points = [Point("snug", 1.0, 0.2), Point("newton-8", 9.0, -0.1)]
-    assert draw_points(axes, run, curves_of(run, points), 20.0, band=0.0) == {"newton-8"}
-    marks = [line for line in axes.get_lines() if line.get_marker() not in ("", "None")]
-    assert [line.get_ydata()[0] for line in marks] == [0.2]

@@ -23,7 +23,7 @@ LETTERS = 1.0  # [points] by which boxes of texts may overlap: letters do not fi
 def drawings() -> list[Drawing]:
     """The figures of the published run of 26 methods."""
     run = read_published(PUBLISHED / "ablations")
-    return [drawing for figure in FIGURES for drawing in figure.drawings(run)]
+    return [drawing for figure in FIGURES if (drawing := figure.draw(run))]
 
 
 def test_panels_of_many_methods_are_at_least_four_centimetres_wide_and_high(drawings):

@@ -57,7 +57,6 @@ def test_means_are_over_sources_recorded_ones_apart_and_the_pooled_share_over_mo
     assert shown["recorded"] == pytest.approx(np.sinh(recorded))
     assert shown["others"] == pytest.approx(60.0)
     assert shown["typical"].shown == pytest.approx(np.sinh((recorded + np.arcsinh(60.0)) / 2.0))
-    assert shown["mean"] == pytest.approx((15.0 + 60.0) / 2.0)
     assert shown["pooled"] == pytest.approx(100.0 * (10.0 + 20.0 + 180.0) / 500.0)
 
 
