@@ -261,10 +261,10 @@ class Picture:
 
 @dataclass(frozen=True)
 class Figure:
-    """A figure: its name, with which its files begin, and what draws it, in no part, in one or in several."""
+    """A figure: its name, with which its files begin, and what draws it where the run has its data."""
 
     name: str
-    drawings: Callable[[Run], Iterable[Drawing]]
+    draw: Callable[[Run], Drawing | None]
 
     def files_in(self, folder: Path) -> list[Path]:
         """Return its files in the folder of figures."""
