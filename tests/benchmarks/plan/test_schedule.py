@@ -10,8 +10,7 @@ from benchmarks import provenance
 from benchmarks.methods import find_method
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
-from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.schedule import Schedule, tasks_of
+from benchmarks.runner.schedule import tasks_of
 from tests.benchmarks.runner.tasks_by_hand import dressed_scene, plan_of
 
 KICK = dressed_scene("kick")
@@ -49,15 +48,3 @@ def test_what_is_measured_in_a_scene_is_no_part_of_its_cells(plan):
     some = dataclasses.replace(KICK, metrics=("energy", "cost", "dynamics"))
     fewer = tuple(dataclasses.replace(cell, scene=some) for cell in CELLS)
     assert changed(plan, dataclasses.replace(plan, cells=fewer)) == {"metrics"}
-
-
-def test_a_cell_that_begins_removes_nothing_that_another_task_of_its_scene_has_made(plan):
-    folder, schedule = RunFolder(plan.folder), Schedule(plan)
-    paths = (folder.start_path, folder.quasi_static_path)
-    made = [path(KICK.name) for path in paths]
-    for path in made:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.touch()
-    for cell in CELLS:
-        removed = {*schedule.cell(cell).files, *schedule.metrics(cell).files}
-        assert removed.isdisjoint(map(folder.relative, made))

@@ -35,14 +35,12 @@ class Misbehaving(Method):
         )  # fmt: skip
 
     def batch(self, copies: int):
-        """Many at once: "crowded" leaves the work to a thread, "torn" raises."""
+        """Many at once: "torn" raises."""
 
         def compute() -> np.ndarray:
             still = np.zeros((self.scene.frames, copies, len(self.scene.start), 3))
             if self.how == "torn":
                 raise RuntimeError("no two bodies")
-            if self.how == "crowded":
-                self._early(still)
             return still
 
         return compute

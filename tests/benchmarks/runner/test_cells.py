@@ -49,14 +49,6 @@ def test_a_cell_that_goes_wrong_is_an_outcome_with_its_reason(how, word, tmp_pat
     assert why(plan) == outcome.ending
 
 
-def test_many_at_once_are_watched_too(tmp_path):
-    plan = plan_of(tmp_path, "newton-1", how="crowded")
-    # In a process that ends: its thread goes on.
-    (row,) = rows(finish(plan, "timed methods", "metrics", processes=True), plan).values()
-    assert (row.status, row.value) == ("failed", None)
-    assert "many at once" in row.reason and "cannot be believed" in row.reason
-
-
 def test_what_a_cell_has_run_stands_where_many_go_wrong(tmp_path):
     plan = plan_of(tmp_path, "newton-1", how="torn")
     runner = finish(plan, "timed methods", "metrics")
