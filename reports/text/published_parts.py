@@ -32,7 +32,6 @@ from importlib import import_module
 from pathlib import Path
 
 from benchmarks.metrics import declared
-from benchmarks.plan.study import PACKAGED, read_study
 from benchmarks.presets import PRESETS
 from benchmarks.results.run_folder import RunFolder
 from reports.finished_run import Run
@@ -307,16 +306,9 @@ def size_rows() -> Rows:
     return [heads, *rows]
 
 
-def study_rows() -> Rows:
-    """Return a heading and a row of each study of the package: its question."""
-    studies = (path.stem for path in sorted(PACKAGED.glob("*.toml")))
-    return [("Study", "Question"), *((f"`{name}`", read_study(name).question) for name in studies)]
-
-
 PARTS = {
     "metrics of benchmarks": metric_rows,
     "sizes": size_rows,
-    "studies of benchmarks": study_rows,
     "evaluations of published runs": evaluation_rows,
 }
 
