@@ -174,12 +174,11 @@ def front_sentences(run: Run) -> str:
     return "\n".join([
         f"**{verdict(run, worn)}**",
         "",
-        f"- Good at: energy for its time. PBNS leaves {number(pbns.typical, 2)} % of that excess, the "
-        f"supervised network {number(supervised.typical, 2)} %; solvers as accurate take at least "
+        f"- Good at: energy for its time. PBNS leaves {number(pbns.typical, 2)} % of that excess, "
+        f"supervision {number(supervised.typical, 2)} %; equally accurate solvers take at least "
         f"{number(solver.time / network.time, 1)} times as long.",
-        f"- Bad at: dynamics and unfamiliar motion. Its hem's dynamics have a correlation of "
-        f"{number(alike.value, 2)} with the simulation's, and {number(100.0 * swing.value, 1)} % of their "
-        f"amplitude; the worst motion, "
+        f"- Bad at: dynamics and unfamiliar motion. Its hem's correlation with the simulation's is "
+        f"{number(alike.value, 2)}, its amplitude {number(100.0 * swing.value, 1)} %; the worst motion, "
         f"{worst.partition('/')[2]}, keeps {number(most, 2)} %.",
     ])  # fmt: skip
 
