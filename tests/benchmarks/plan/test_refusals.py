@@ -30,7 +30,7 @@ FIELDS = [  # study.toml -> line, field, and what is near it
 ]
 WORDS = [
     ("dfault", "no study 'dfault': name one, or a file or folder with study.toml; did you mean default"),
-    ("default:shapes", "no such scene meets such a method in part shapes"),
+    ("full:shapes", "no such scene meets such a method in part shapes"),
     ("--set sizes.frames=2", "sizes.frames: 2: give 3 or more"),
     ("--scenes tshirt/walk", "see test_motions"),
     ("--methods sung", "did you mean snug"),
