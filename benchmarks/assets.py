@@ -148,23 +148,24 @@ def open_assets(
     *,
     inputs: Inputs | None = None,
     training: Collection[str] = (),
+    ready: Mapping[str, Garment] | None = None,
 ) -> Assets:
     """Tailor these garments to the body, but for the user's, and cut motions to the preset's lengths.
 
-    Those named in `training` have another length. Raises ValueError for one that cannot be tailored.
+    Those named in `training` have another length. Garments in `ready` are not tailored. Raises ValueError
+    for one that cannot be.
 
     >>> assets = open_assets(find_preset("smoke"), embedded_motions(["walk"]), ["tshirt"])  # doctest: +SKIP
     """
-    from snug.garments.templates import find_template
-
     inputs = inputs or Inputs()
-    wearer, worn = inputs.wearer, inputs.garment
-    tailored = {
-        name: worn.content
-        if worn and name == worn.name
-        else find_template(name).tailor(wearer, vertices=preset.garment_vertices)
-        for name in garments
-    }
+    wearer, worn, tailored = inputs.wearer, inputs.garment, {}
+    at_hand = {**(ready or {}), **({worn.name: worn.content} if worn else {})}
+    for name in garments:
+        if (garment := at_hand.get(name)) is None:
+            from snug.garments.templates import find_template  # loads libraries of meshes
+
+            garment = find_template(name).tailor(wearer, vertices=preset.garment_vertices)
+        tailored[name] = garment
     longest = {True: preset.train_frames, False: preset.frames}
     whole = [motion.cut(0, longest[motion.name in training]) for motion in motions]
     clips = {

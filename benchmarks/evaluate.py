@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import shutil
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
@@ -19,11 +19,11 @@ import numpy as np
 from benchmarks.assets import Assets, embedded_motions, open_assets
 from benchmarks.external.roll_out_files import MODULE
 from benchmarks.metric import RollOut
-from benchmarks.metrics.energy_gap import judge_steps
+from benchmarks.metrics.energy_gap import gap_scale, judge_steps
 from benchmarks.plan.cell import Cell, TaskId, id_of
 from benchmarks.plan.plan import Plan, runs
 from benchmarks.provenance import digest_of_file
-from benchmarks.references import TRAINED, Reference, find_reference, packaged_network
+from benchmarks.references import TRAINED, Reference, find_reference, packaged_network, shipped_garment
 from benchmarks.results.run_folder import RunFolder, model_path
 from benchmarks.runner.cells import prepared_method, run_cell
 from benchmarks.runner.ground_truth import simulate_quasi_static
@@ -87,7 +87,10 @@ def assets_of(plan: Plan) -> Assets | None:
     read = plan.inputs.motions
     names = dict.fromkeys(scene.motion for scene in plan.scenes if scene.dressed)
     motions = [read[name] if name in read else embedded_motions([name])[0] for name in names]
-    return open_assets(plan.study.sizes, motions, plan.garments, inputs=plan.inputs) if names else None
+    if not names:
+        return None
+    sizes, ready = plan.study.sizes, shipped_garment(plan)
+    return open_assets(sizes, motions, plan.garments, inputs=plan.inputs, ready=ready)
 
 
 def _of_scene(
@@ -153,7 +156,8 @@ def _steps_beside(roll_out: RollOut) -> Iterator[None]:
         return
     fork: Any = get_context("fork")  # what the process needs is there, and nothing is loaded again
     with ProcessPoolExecutor(1, fork, _remember, (roll_out,)) as pool:
-        roll_out.keep(judge_steps, pool.submit(_judge_remembered))
+        roll_out.group.keep(gap_scale, pool.submit(_of_remembered, gap_scale))
+        roll_out.keep(judge_steps, pool.submit(_of_remembered, judge_steps))
         yield
 
 
@@ -164,5 +168,6 @@ def _remember(roll_out: RollOut) -> None:
     _remembered[:] = [roll_out]
 
 
-def _judge_remembered() -> Any:
-    return judge_steps(_remembered[0])
+def _of_remembered(make: Callable[[Any], Any]) -> Any:
+    roll_out = _remembered[0]
+    return roll_out.group.kept(make) if make is gap_scale else roll_out.kept(make)

@@ -58,6 +58,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     known, head, failed = published_studies(), commit(), 0
     if options.studies == [REFERENCES]:
+        from benchmarks.references import VERTICES, write_garment
+        from snug import Body, find_template  # loads libraries of meshes
+
+        write_garment(find_template("tshirt").tailor(Body.load(), vertices=VERTICES))
         for motion in TEST:
             print(make_reference(f"tshirt/{motion}", options.out / REFERENCES), flush=True)
         return 0

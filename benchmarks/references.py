@@ -24,6 +24,7 @@ from benchmarks.scene import Scene
 from reference_sim.files.array_file import read_arrays
 from reference_sim.files.atomic_files import replacing
 from reference_sim.geometry.topology import half_edges
+from snug.garments.garment import Garment
 from snug.trained import FOLDER as NETWORKS
 from snug.trained import SUFFIX, network_name
 
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
     from benchmarks.scene import BuiltScene
 
 FOLDER = Path(__file__).parent / "reference_data"
+GARMENT, LOOP = FOLDER / "garment.npz", "loop_"
+TSHIRT, VERTICES = "tshirt", 1000  # the garment of the scenes, and about how many vertices it has
 METHODS = ("simulation", "skinning", "snug", "pbns")  # whose metrics are shipped
 TRAINED = METHODS[2:]
 STEP = 2.0**-18  # [m] to which positions are rounded
@@ -70,7 +73,23 @@ class Reference:
 
 def packaged_network(method: str) -> Path:
     """Return the file of the package's network for the T-shirt."""
-    return NETWORKS / f"{network_name(method, 'tshirt', 0)}{SUFFIX}"
+    return NETWORKS / f"{network_name(method, TSHIRT, 0)}{SUFFIX}"
+
+
+def shipped_garment(plan: Plan) -> dict[str, Garment]:
+    """Return the T-shirt by its name, as it is tailored to the package's body; empty for another one."""
+    if plan.inputs.body or plan.study.sizes.garment_vertices != VERTICES or not GARMENT.is_file():
+        return {}
+    arrays = read_arrays(GARMENT)
+    loops = {name.removeprefix(LOOP): arrays.pop(name) for name in list(arrays) if name.startswith(LOOP)}
+    return {TSHIRT: Garment(TSHIRT, **arrays, loops=loops)}
+
+
+def write_garment(garment: Garment) -> None:
+    """Write the file that `shipped_garment` reads."""
+    names = ("rest_positions", "faces", "body_vertices", "skinning_weights")
+    loops = {f"{LOOP}{name}": loop for name, loop in garment.loops.items()}
+    np.savez_compressed(GARMENT, **{name: getattr(garment, name) for name in names}, **loops)
 
 
 def key_of(scene: Scene, plan: Plan, built: BuiltScene) -> str:
