@@ -17,7 +17,7 @@ import typst
 
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.files.atomic_files import replacing
-from reports.blocks import BLOCKS, ROWS, Heading, Report, TableBlock
+from reports.blocks import BLOCKS, Heading, Report, TableBlock
 from reports.figures.plotting import Figure, Picture, printable
 from reports.finished_run import Run
 from reports.sentences import headline
@@ -48,6 +48,7 @@ def _text(value: Any) -> str:
 
 
 Values = dict[str, Any]  # of one block, as JSON takes them
+WHOLE = 8  # rows of a table that stays on one page, as that of page one
 FEW = 5  # up to so many columns, the columns of a table share its width evenly
 
 
@@ -93,7 +94,7 @@ def lay_out_table(run: Run, table: Table) -> Values:
             for column, width in zip(columns, _widths(columns))
         ],
         "groups": [{"title": title, "rows": rows} for title, rows in groups.items()],
-        "breakable": len(table.rows) > ROWS,
+        "breakable": len(table.rows) > WHOLE,
     }
 
 
@@ -117,13 +118,15 @@ def content(report: Report) -> dict[str, Any]:
         else:
             sections[-1]["blocks"] += lay_out(report, block)
     workers = config.get("workers") or 1
+    sentences = dict(headline(run))
     return {
         "title": "Neural garments versus a reference solver",
         "subtitle": report.subtitle,
         # That of a smoke test says that its numbers mean nothing.
         "size": str((config.get("preset_values") or {}).get("description") or ""),
         "warnings": ". ".join([*run.warnings, ""]).strip(),
-        "sentences": headline(run),
+        "verdict": sentences.pop("Verdict", ""),
+        "sentences": list(sentences.items()),
         "first": sections[0]["blocks"],
         "workers": f"up to {workers} side by side" if workers > 1 else "one after another",
         "configuration": configuration(config, run.frame),

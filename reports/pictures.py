@@ -137,7 +137,7 @@ PER_ROW = 4
 TALL = 1.25  # height of a view over its width
 SMOOTHED = 0.6  # [s] over which the camera's path is smoothed
 MARGIN = 1.25  # around the garment
-WIDEST = 1.7  # inches of a view in the report
+WIDEST = 1.3  # inches of a view in the report
 AZIMUTH = 25.0  # of the camera, from the front to the body's left [degrees]
 
 
@@ -212,7 +212,7 @@ def _composed(selected: SceneRollOuts, pictures: np.ndarray, frame: int, time: f
     from PIL import Image, ImageDraw, ImageFont
 
     count, height, width, _ = pictures.shape
-    letter = max(12, width // 17)
+    letter = max(12, width // 15)
     font = ImageFont.truetype(f"{get_data_path()}/fonts/ttf/DejaVuSans.ttf", letter)
     rows = -(-count // PER_ROW)
     columns = -(-count // rows)

@@ -196,6 +196,8 @@ def print_summary(model: TrainedModel) -> None:
     print(f"recipe {model.recipe.name}, {model.summary['training_frames']} frames")
     print(f"last steps, {model.unit} (energies J), mean over frames: " + "  ".join(terms))
     for window in model.summary["named_windows"][:5]:
+        if window["action"] == "gradient clipped":  # which is part of the recipe
+            continue
         print("step {step}: {window} at {joules} {unit}, {action}".format(**window, unit=model.unit))
     if validation := model.summary.get("validation"):
         print("validation {best:.4g} at step {best_step}, whose weights are kept".format(**validation))

@@ -34,6 +34,7 @@ from reports.statistics.pareto import (
     run_time,
     time_label,
 )
+from reports.tables.table import scene_in_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -194,7 +195,8 @@ def _draw_page_one(
         entries.append(Style(run.label(run.reference), "black", "", ":"))
     axes.set(xlabel=time_label(time), ylabel=metric.heading)
     fit(figure, entries, markers=True)
-    caption = f"{rows['scene'].iloc[0]}: lower left is better. Pale line: the best at each time."
+    scene = scene_in_words(rows["scene"].iloc[0])
+    caption = f"{scene}: lower left is better. Pale line: the best at each time."
     for solvers in (curve for curve in curves if curve.look is SOLVERS):
         first, last = (run.label(solvers.points[end].method) for end in (0, -1))
         caption += f" {SOLVERS.label}: from {first} to {last}"
@@ -232,9 +234,7 @@ def energy_series(run: Run) -> Drawing | None:
         axes.set(title=term.capitalize(), xlabel="time [s]")
     panels[0].set_ylabel("energy [J]")
     fit(figure, [style(run, method) for method in methods])
-    caption = (
-        f"{scene}: energy of each frame by term, logarithmic. A frame with no energy at all is a gap."
-    )
+    caption = f"{scene_in_words(scene)}: energy of each frame by term. A frame without energy is a gap."
     return Drawing(figure, f"energy_series_{file_name(scene)}", caption)
 
 

@@ -17,7 +17,7 @@ from reports.statistics.pareto import (
     run_time,
 )
 from reports.statistics.relative_excess import excess_of, own_excess_of, with_relative_excess
-from reports.tables.table import Cell, Column, Table, in_scenes, metric_column, table
+from reports.tables.table import Cell, Column, Table, in_scenes, metric_column, scene_in_words, table
 
 ROWS = 8
 ANSWERS = ("penetration/surface", "dynamics/correlation", "dynamics/amplitude")
@@ -81,9 +81,8 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
         return []
     of_motions = (
         f"{garment}: excess as a geometric mean over independent sources, the rest as arithmetic means over "
-        "motions. In own energies: over the minimum of what the network was trained on, so how well it was "
-        "trained; relative excess: by the energies that all are compared by. A dash: trained on simulated "
-        "vertices, or on energies without a minimum"
+        "motions. In own energies: over the minimum of what the network was trained on (a dash: of vertices, "
+        "or without a minimum)"
     )
     caption = of_motions if garment else f"Means {in_scenes(scenes)}"
     caption += f"; run times (and energy gaps) {in_scenes(scenes)}." if garment and scenes else "."
@@ -126,7 +125,8 @@ def reference_uncertainty(run: Run) -> list[Table]:
     ]
     columns = (Column("of", "Simulation or network", text=True), *of_scenes, *map(metric_column, metrics))
     caption = (
-        f"Reference, simulations with smaller time steps, and networks in {', '.join(scenes)}. Errors below "
-        "the twin's from another start are as small as those of another valid simulation."
+        f"Reference, simulations with smaller time steps, and networks {in_scenes(scenes)} "
+        f"({'; '.join(map(scene_in_words, scenes))}). Errors below the twin's from another start are as "
+        "small as those of another valid simulation."
     )
     return table("reference_uncertainty", columns, lines, caption)

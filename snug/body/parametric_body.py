@@ -66,6 +66,9 @@ class Body:
         arrays["skinning_weights"] /= arrays["skinning_weights"].sum(axis=1, keepdims=True)
         return Body(**arrays)
 
+    def __repr__(self) -> str:
+        return f"Body({len(self.template)} vertices, {self.shape_count} shape coefficients)"
+
     @property
     def shape_count(self) -> int:
         """Number S of shape coefficients."""

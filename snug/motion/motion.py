@@ -73,6 +73,9 @@ class Motion:
         object.__setattr__(self, "poses", poses)
         object.__setattr__(self, "translations", translations)
 
+    def __repr__(self) -> str:
+        return f"Motion({self.name!r}, {self.frames} frames at {self.fps:g} per second)"
+
     @property
     def frames(self) -> int:
         """Number of frames."""

@@ -20,7 +20,7 @@ pdfium = pytest.importorskip("pypdfium2", reason="the test extra is not installe
 CM = 72.0 / 2.54
 MARGIN = 2.0 * CM
 SLACK = 1.0  # [pt] by which boxes may reach over a margin or into each other
-MOST_PAGES = 12
+MOST_PAGES = 8
 LONG = "x" * 60 + "_with_a_name_as_long_as_a_run_lets_it_be"
 HOSTILE = ("#strong[markup] $x$ *b* _i_ @ref <b>&amp;", "quo\"ted 'name' `raw`", "裙子/夏天-βήτα", LONG)
 
