@@ -33,18 +33,23 @@ DIFFERENTIATED = {"gradient": 0, "hessian": 1}  # the energy, or the gradient
 def error(kind: str, term: str) -> float:
     """Return the relative error of a term's gradient or Hessian beside differences of fourth order."""
     energy, x = _in_disorder(term)
-    hessian = sim.Potential([energy]).hessian(x) if kind == "hessian" else None
-    claimed = energy.value_and_gradient(x)[1].ravel() if hessian is None else hessian
     errors = []
-    for d in np.random.default_rng(1).normal(0, 0.03, (DIRECTIONS, *x.shape)):
-        at = [energy.value_and_gradient(x + steps * STEP * d) for steps in (-2, -1, 1, 2)]
-        values = [np.ravel(pair[DIFFERENTIATED[kind]]) for pair in at]
-        difference = sum(weight * value for weight, value in zip(WEIGHTS, values)) / STEP
-        size = float(np.linalg.norm(difference))
+    for direction in np.random.default_rng(1).normal(0, 0.03, (DIRECTIONS, *x.shape)):
+        off, size = off_by(energy, x, direction, kind)
         if size < 1e-9:
             raise RuntimeError("a derivative of nothing proves nothing")
-        errors.append(float(np.linalg.norm(claimed @ d.ravel() - difference)) / size)
+        errors.append(off / size)
     return max(errors)
+
+
+def off_by(energy: energies.Energy, x: np.ndarray, d: np.ndarray, kind: str) -> tuple[float, float]:
+    """Return the error of a gradient or Hessian at x (V,3) along d (V,3) [m], and the size of what is due."""
+    hessian = sim.Potential([energy]).hessian(x) if kind == "hessian" else None
+    claimed = energy.value_and_gradient(x)[1].ravel() if hessian is None else hessian
+    at = [energy.value_and_gradient(x + steps * STEP * d) for steps in (-2, -1, 1, 2)]
+    values = [np.ravel(pair[DIFFERENTIATED[kind]]) for pair in at]
+    difference = sum(weight * value for weight, value in zip(WEIGHTS, values)) / STEP
+    return float(np.linalg.norm(claimed @ d.ravel() - difference)), float(np.linalg.norm(difference))
 
 
 def _in_disorder(term: str) -> tuple[energies.Energy, np.ndarray]:

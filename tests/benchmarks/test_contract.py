@@ -77,7 +77,7 @@ def test_the_command_names_what_is_wrong_in_a_file_and_its_remedy(number, file, 
 
 def test_a_method_is_checked_in_three_scenes_and_one_that_is_bound_to_a_mesh_where_it_is(file, capsys):
     bound = "assert scene.cloth.vertex_count == 49, 'bound to 49 vertices'"
-    assert check.main([file(METHOD.replace("self.scene = scene", f"{bound}; self.scene = scene"))]) == 1
+    assert check.main([file(METHOD.replace("self.scene, _ =", f"{bound}; self.scene, _ ="))]) == 1
     out = capsys.readouterr().out
     assert out.count("bound to 49 vertices") == 3 and "still in tshirt/kick: wrong" in out
 
