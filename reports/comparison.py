@@ -120,15 +120,10 @@ def compare(
     times: bool = True,
     shared: bool = False,
 ) -> Comparison:
-    """Compare two runs.
+    """Compare the earlier run with the other.
 
-    Args:
-        one: the earlier run.
-        other: the later run.
-        metrics: patterns joined by commas.
-        methods: likewise.
-        times: compare run times and memory too.
-        shared: leave out what the later run lacks; otherwise it is a change for the worse.
+    metrics, methods: patterns joined by commas. times: compare run times and memory too. shared: leave out
+    what the later run lacks; otherwise it is a change for the worse.
 
     Raises:
         ResultsError: where protocols differ, of the runs or of a cell, or presets, sizes, body or

@@ -35,13 +35,7 @@ MOST_RATE = 50.0  # frames a second of a GIF that browsers show in their time
 def select_roll_outs(
     folder: RunFolder, scene: str, methods: Sequence[str], seed: int | None = None
 ) -> SceneRollOuts:
-    """Read roll-outs of a scene.
-
-    Args:
-        folder: of the run.
-        scene: as results.csv names it.
-        methods: as results.csv names them.
-        seed: of methods that have one; None takes the first that the run has.
+    """Read roll-outs of a scene; of methods that have seeds this one, or the first that the run has.
 
     Raises:
         ResultsError: for a roll-out that the run did not keep; the message names those of its scenes.

@@ -166,10 +166,8 @@ def _differences(metric: Metric, rows: pd.DataFrame) -> pd.DataFrame:
 def _scatter(residuals: np.ndarray, places: np.ndarray, draws: np.ndarray) -> tuple[np.ndarray, float]:
     """Return the standard deviation over seeds in each scene, at least the pooled one, and its freedom.
 
-    Args:
-        residuals: (N,) values less the mean over the seeds of their scene and run.
-        places: (N,) numbers of their scenes.
-        draws: (N,) numbers of their trainings, each a seed of a run.
+    residuals: (N,) values less the mean over the seeds of their scene and run. places, draws: (N,) numbers
+    of their scenes, and of their trainings, each a seed of a run.
 
     A seed may move all scenes alike. With correlation rho between S scenes, the pooled variance has
     1 + (S - 1) rho^2 times fewer degrees of freedom than with independent scenes.

@@ -10,15 +10,15 @@ from functools import lru_cache
 import pandas as pd
 
 from reports.finished_run import Run
-from reports.statistics.means_and_spreads import error_of_twin, value_of
+from reports.statistics.means_and_spreads import value_of
 from reports.statistics.outcomes import BAD, EXTERNAL, LEARNED, counted, leads, published_verdicts
 from reports.statistics.paper_claims import counts, in_words, judged
-from reports.statistics.pareto import compared_scenes, indistinct, run_time
+from reports.statistics.pareto import compared_scenes, run_time
 from reports.statistics.relative_excess import RELATIVE_EXCESS, excess_of, with_relative_excess
 from reports.statistics.verdicts import compare_methods
-from reports.tables.table import in_scenes, number
+from reports.tables.table import number
 
-CURVATURE, DISTANCE, ALIKE = "curvature/histogram", "distance/rms", "dynamics/correlation"
+ALIKE = "dynamics/correlation"
 
 
 def headline(run: Run) -> list[tuple[str, str]]:
@@ -30,7 +30,7 @@ def headline(run: Run) -> list[tuple[str, str]]:
 @lru_cache(maxsize=4)
 def _measured(run: Run) -> dict[str, str]:
     worn = run.garment_rows[run.garment_rows["garment"] == run.first_garment]
-    return {"Verdict": verdict(run, worn), "How certain": _certainty(run, worn)}
+    return {"Verdict": verdict(run, worn), "How certain": _certainty(run)}
 
 
 def verdict(run: Run, worn: pd.DataFrame) -> str:
@@ -88,35 +88,23 @@ def _kind(run: Run, scenes: Collection[str]) -> str:
     return "validation " if set(scenes) <= set(run.with_motion("validation")) else "unseen "
 
 
-def _certainty(run: Run, worn: pd.DataFrame) -> str:
-    """Say which primary claims hold, and how far equally valid simulations lie from the reference.
-
-    One seed decides next to nothing: the published verdicts stand beside those of such a run.
-    """
-    sentences = []
-    if counted_claims := counts(judged(run)):
-        tests = f"{counted_claims.total()} test{'' if counted_claims.total() == 1 else 's'}"
-        published = published_verdicts() if run.frame["seed"].nunique() == 1 else ""
-        beside = f" with one seed; in the published run {published}" if published else ""
-        sentences.append(f"Of {tests} of primary claims of the paper {in_words(counted_claims)}{beside}.")
-    distance, curvature = (indistinct(run, worn, metric) for metric in (DISTANCE, CURVATURE))
-    if distance and curvature:
-        sentences.append(
-            f"The reference from another start lies {number(distance, 2)} mm and, by the distribution of "
-            f"curvature, {number(curvature, 2)} 1/m away, "
-            f"{in_scenes(set(error_of_twin(worn, DISTANCE).index))}: errors below that show no difference."
-        )
-    return " ".join(sentences)
+def _certainty(run: Run) -> str:
+    """Say which primary claims hold; one seed decides next to nothing: there the published verdicts stand."""
+    counted_claims = counts(judged(run))
+    if not counted_claims:
+        return ""
+    tests = f"{counted_claims.total()} test{'' if counted_claims.total() == 1 else 's'}"
+    published = published_verdicts() if run.frame["seed"].nunique() == 1 else ""
+    beside = f" with one seed; in the published run {published}" if published else ""
+    return f"Of {tests} of primary claims of the paper {in_words(counted_claims)}{beside}."
 
 
 def endings(run: Run) -> str:
-    """Say how many cells, checks and stress tests ended how, with every kind that is not ok."""
+    """Say how many cells, checks and stress tests did not end well, and how; empty where all did."""
     parts = []
     for kind, statuses in counted(run).items():
-        bad = [f"{statuses[name]} {name}" for name in (*BAD, "skipped") if statuses[name]]
-        parts.append(
-            f"of {sum(statuses.values()):,} {kind} {', '.join(bad) if bad else 'all ended well'}"
-        )
+        if bad := [f"{statuses[name]} {name}" for name in BAD if statuses[name]]:
+            parts.append(f"of {sum(statuses.values()):,} {kind} {', '.join(bad)}")
     parts += [f"{len(run.problems)} files could not be read"] if run.problems else []
     text = "; ".join(parts)
     return f"{text[:1].upper()}{text[1:]}." if text else ""

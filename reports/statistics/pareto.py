@@ -44,11 +44,8 @@ class Point:
 def points_of(run: Run, frame: pd.DataFrame, scenes: Sequence[str], metric: str) -> list[Point]:
     """Return a point for each method that has both numbers in all the scenes and seeds.
 
-    Args:
-        run: the run.
-        frame: rows of it.
-        scenes: over which means are taken, over seeds too that came through all of them.
-        metric: of the error.
+    frame: rows of the run. scenes: over which means are taken, over seeds too that came through all of
+    them. metric: of the error.
     """
     rows = frame[frame["scene"].isin(list(scenes))]
     x = run_time(rows)

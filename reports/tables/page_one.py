@@ -27,9 +27,7 @@ GAP = "gap/energy"
 def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     """Tabulate reference, baselines and networks of the first garment, and the solvers as good as SNUG.
 
-    Args:
-        run: the run.
-        methods: rows in place of these.
+    methods: rows in place of these.
 
     Relative excess, penetration and dynamics are means over its motions, energy gaps and times over the
     scenes in which solvers were timed.

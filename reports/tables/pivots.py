@@ -69,11 +69,8 @@ def pivot(
 ) -> tuple[list[Metric], list[tuple[Cell, ...]]]:
     """Compute means of the frame, a line for each value of the keys, a column for each metric.
 
-    Args:
-        run: the run.
-        frame: rows of it; those that failed say what a mean lacks.
-        name: of the table that the metrics declare.
-        keys: columns of results.csv that name a line, the last of them "method".
+    frame: rows of the run; those that failed say what a mean lacks. name: of the table that the metrics
+    declare. keys: columns of results.csv that name a line, the last of them "method".
     """
     wanted = frame[frame["table"] == name]
     usable = set(wanted[wanted["usable"]]["metric"])

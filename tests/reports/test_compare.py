@@ -238,14 +238,13 @@ def test_exit_status_and_lines(tmp_path, capsys):
 
 
 def test_the_chief_metrics_of_each_method_stand_in_few_lines_snug_first(tmp_path, capsys):
+    surface = {"metric": "penetration/surface", "unit": "%"}
+
     def inside(factor: float):
         for s in SCENES:
-            for k in range(20):
-                yield row(s, f"solver-{k}", "penetration/surface", 3.0, unit="%", seeded=False)
-            yield row(
-                s, "snug", "penetration/surface", 2.0 * (factor if s == SCENES[0] else 1.0), unit="%"
-            )
-            yield row(s, "simulation", "penetration/surface", 1.0 * factor, unit="%")
+            yield from (row(s, f"solver-{k}", value=3.0, seeded=False, **surface) for k in range(20))
+            yield row(s, "snug", value=2.0 * (factor if s == SCENES[0] else 1.0), **surface)
+            yield row(s, "simulation", value=factor, **surface)
             yield from (row(s, "skinning", f"energy/t{m}", factor) for m in range(20))
 
     run_folder(tmp_path / "a", list(inside(1.0)))

@@ -18,7 +18,7 @@ from reports.statistics.means_and_spreads import Mean
 from reports.tables.table import METHOD, Column, Table
 from reports.text.for_your_paper import latex, write_paper_table
 from reports.text.published_parts import BEGIN, END, docstring_rows, fill, published_part
-from reports.text.text_table import remarks_on, text_rows
+from reports.text.text_table import text_rows
 from snug.body.smpl_files import SYNONYMS
 from snug.motion.files import ARRAY_NAMES
 from tests.reports.report_folder import row, run_of
@@ -43,13 +43,6 @@ def test_an_interval_has_a_column_of_its_own_and_empty_columns_are_left_out():
     assert head == ["Method", "Excess [%]", "Interval", "Total [J]"]
     assert snug[0] == "SNUG" and " to " in snug[2] and "±" not in snug[3] and snug[3] == "0.250"
     assert skinning == ["skinning", "–", "–", "–"]
-
-
-def test_a_mean_over_fewer_roll_outs_is_marked_and_the_mark_explained():
-    fewer = replace(small_table(), rows=(("snug", None, Mean(0.25, None, seeds=3, asked=3), None),))
-    rows = text_rows(RUN, fewer)
-    assert rows[1] == ["SNUG", "0.250*"]
-    assert remarks_on(rows).startswith("* A mean over fewer") and remarks_on(rows[:1]) == ""
 
 
 def test_the_docstring_of_rows_has_each_of_their_columns_once():

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from reports.figures import plotting
 from reports.figures.charts import curves_of
-from reports.finished_run import shown_seeds
 from reports.statistics.pareto import Point
 from tests.reports.report_folder import row, run_of
 
@@ -16,13 +15,6 @@ def test_methods_keep_their_order_and_their_look():
     assert run.ordered(names) == known
     assert plotting.style(run, "newton-2").label == "Newton, 2 iterations"
     assert plotting.style(run, "newton-2").colour == plotting.style(run, "newton-4").colour
-
-
-def test_the_first_seed_that_came_to_its_end_is_shown():
-    bad = [row(value=None, status="diverged", reason="no end", method=m) for m in ("snug", "pbns")]
-    rows = [*bad, row(seed=2), row(seed=1), row(method="skinning")]
-    seeds = shown_seeds(run_of(rows).frame).loc["tshirt/walk"]
-    assert seeds.to_dict() == {"snug": 1, "pbns": 0, "skinning": 0}
 
 
 # method: run time, error
