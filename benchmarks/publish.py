@@ -84,41 +84,39 @@ def make_reference(name: str, out: Path) -> Path:
 
     A scene is simulated where it has none that fits; else only what is measured beside it is made anew.
     """
+    from benchmarks import references
     from benchmarks.evaluate import assets_of, evaluate  # loads the simulator
-    from benchmarks.references import (
-        METHODS,
-        TRAINED,
-        Reference,
-        find_reference,
-        packaged_network,
-        write_reference,
-    )
     from reference_sim import Trajectory
 
-    study = replace(read_study("full:garments"), scenes=(name,), methods=METHODS)
+    study = replace(read_study("full:garments"), scenes=(name,), methods=references.METHODS)
     plan = make_plan(study, folder=out / flat(name))
     cells = (replace(cell, entry=replace(cell.entry, timed=False)) for cell in plan.cells)
     plan, run = replace(plan, cells=tuple(cells)), RunFolder(plan.folder)
     scene = plan.scenes[0]
     built = scene.build(assets_of(plan))
-    reference = find_reference(scene, plan, built)
-    if not isinstance(reference, Reference):
+    reference = references.find_reference(scene, plan, built)
+    if not isinstance(reference, references.Reference):
         evaluate(plan, {})
-        simulation = Trajectory.load(run.trajectory_path(name, METHODS[0]))
+        simulation = Trajectory.load(run.trajectory_path(name, references.METHODS[0]))
         assert built.dressed is not None
         hem = Trajectory.load(run.quasi_static_path(name)).positions[:, built.dressed.garment.hem]
-        row = next(row for row in run.read_rows() if row.method == METHODS[0])
-        reference = Reference(simulation.positions, hem, row.status, row.reason)
+        row = next(row for row in run.read_rows() if row.method == references.METHODS[0])
+        positions, hem = (
+            references.STEP * (x / references.STEP).round() for x in (simulation.positions, hem)
+        )  # as it is read
+        reference = references.Reference(positions, hem, row.status, row.reason)
     log = evaluate(plan, {name: replace(reference, metrics={})})
     metrics = {
         method: {
             row.metric: row.value for row in log.rows if row.method == method and row.value is not None
         }
-        for method in METHODS
+        for method in references.METHODS
     }
-    networks = {method: digest_of_file(packaged_network(method)) for method in TRAINED}
+    networks = {
+        method: digest_of_file(references.packaged_network(method)) for method in references.TRAINED
+    }
     known = replace(reference, metrics=metrics, origin=log.origin, networks=networks)
-    return write_reference(scene, plan, known, built)
+    return references.write_reference(scene, plan, known, built)
 
 
 def published_studies() -> list[str]:
