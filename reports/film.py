@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -84,7 +85,12 @@ def write_frames(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:
     ]
     ends = [10 * round(100.0 * (k + 1) / rate) for k in range(len(drawn))]
     durations = [end - start for start, end in zip([0, *ends], ends)]
-    more = {"save_all": True, "append_images": drawn[1:], "duration": durations, "loop": 0}
+    more: dict[str, Any] = {
+        "save_all": True,
+        "append_images": drawn[1:],
+        "duration": durations,
+        "loop": 0,
+    }
     drawn[0].save(path, **(more if len(drawn) > 1 else {}))
 
 
