@@ -13,9 +13,7 @@ from typing import TYPE_CHECKING
 from snug.named_recipes import (
     HANDLES,
     NCS,
-    NEAREST_POSES,
     PBNS,
-    POSE_REGRESSION,
     SANTESTEBAN2019,
     SUPERVISED,
     TAILORNET,
@@ -42,7 +40,6 @@ class Kind:
         targets: what teaches it: the `energies`, simulated `vertices`, or `bands` of their unposed
             offsets (snug.training.simulated_data).
         static: whether it knows single frames alone, so that no inertia is in its loss.
-        fitted: whether it is fitted in one go, in place of training steps (snug.networks.fitted).
         closed_form: whether it trains faster by snug.kernels.gru.
         cost: time of a step, where one of SNUG's takes 1.
     """
@@ -54,7 +51,6 @@ class Kind:
     recipe: Recipe = DEFAULT
     targets: str = "energies"
     static: bool = False
-    fitted: bool = False
     closed_form: bool = False
     cost: float = 1.0
 
@@ -76,11 +72,11 @@ class Kind:
         return UNITS[self.targets]
 
     def check(self, recipe: Recipe) -> None:
-        """Raise RecipeError for a `physics_weight` where no steps are taken on simulated vertices."""
-        if recipe.physics_weight and (self.targets != "vertices" or self.fitted):
+        """Raise RecipeError for a `physics_weight` where no simulated vertices teach."""
+        if recipe.physics_weight and self.targets != "vertices":
             raise RecipeError(
                 f"recipe option physics_weight={recipe.physics_weight}: {self.name} learns no simulated "
-                "vertices step by step; use 0"
+                "vertices; use 0"
             )
 
 
@@ -101,12 +97,6 @@ KINDS = {
              recipe=SANTESTEBAN2019, targets="vertices", closed_form=True),
         Kind(name="tailornet", label="TailorNet", architecture="tailornet.FrequencyMixture",
              recipe=TAILORNET, targets="bands", static=True),
-        Kind(name="nearest-poses", label="Nearest poses", architecture="fitted.NearestPoses",
-             recipe=NEAREST_POSES, targets="vertices", static=True,
-             fitted=True),
-        Kind(name="pose-regression", label="Ridge on principal components",
-             architecture="fitted.PoseRegression", recipe=POSE_REGRESSION, targets="vertices", static=True,
-             fitted=True),
         _handles(20, 0.4),
         _handles(40, 0.4),
         _handles(80, 0.5),

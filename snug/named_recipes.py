@@ -89,9 +89,6 @@ TAILORNET = replace(
     output_scale=1.0,
     terms=(),
 )
-# Offsets as they are; everything else of a recipe is of steps, which these have not.
-NEAREST_POSES = replace(TAILORNET, name="nearest-poses")
-POSE_REGRESSION = replace(TAILORNET, name="pose-regression")
 # Twice the default's rate: at the default's the relative excess on validation motions was larger by a
 # fifth.
 PBNS = replace(DEFAULT, name="pbns", learning_rate=2e-3)

@@ -27,15 +27,13 @@ if TYPE_CHECKING:
     from snug.motion.motion import Motion
     from snug.networks.trained_model import TrainedModel
 
-MODELS = [name for name, kind in KINDS.items() if not kind.fitted]
 CHECKPOINT_MINUTES = 1.0  # between two checkpoints: what a kill loses at most
-SIMULATED = [name for name in MODELS if not KINDS[name].physics]
+SIMULATED = [name for name in KINDS if not KINDS[name].physics]
 EXAMPLES = f"""examples:
   python -m snug.train                                   SNUG on the embedded motions, 1000 vertices
   python -m snug.train --garment shirt.obj,units=cm --body mine.npz    your own garment (see snug.check)
   python -m snug.train --model pbns --steps 8000         the static baseline
   python -m snug.train --motions clips/ --hold-out 01_01 -o clips.safetensors
-  python -m snug.train --validation kick --patience 10   stop when a validation motion gets no better
   python -m snug.train --recipe paper --vertices 4400    the paper's text (see snug.named_recipes on contact)
   python -m snug.train --dataset motions.h5 --model supervised    learn from simulated motions
   python -m snug.train --resume                          go on where a killed run wrote its last checkpoint
@@ -53,7 +51,7 @@ def parse_options(arguments: Sequence[str] | None = None) -> argparse.Namespace:
         epilog="\n\n".join((EXAMPLES, GARMENT_WORDS, MOTION_WORDS)),
     )
     add, garments = parser.add_argument, ", ".join(template.name for template in GARMENT_TEMPLATES)
-    add("--model", choices=MODELS, default="snug", help="network and loss (default: %(default)s)")
+    add("--model", choices=tuple(KINDS), default="snug", help="network and loss (default: %(default)s)")
     add("--recipe", choices=tuple(RECIPES), help="named options (default: the model's own)")
     add("--steps", type=int, default=4000, help="updates (default: %(default)s)")
     add("--garment", metavar="NAME|FILE", default=TSHIRT,
@@ -65,11 +63,6 @@ def parse_options(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     add("--dataset", metavar="FILE", help="a file of simulated motions")
     add("--hold-out", metavar="NAME", action="append", default=[],
         help="leave a motion out; may be repeated")  # fmt: skip
-    add("--validation", metavar="NAME", action="append", default=[],
-        help="roll this motion out now and then: one held out of training, or of the library a validation "
-        "motion or one without a role; may be repeated. The weights that do best are kept")  # fmt: skip
-    add("--patience", metavar="N", type=int, default=0,
-        help="validations without a better value, after which training stops (default: never)")  # fmt: skip
     add("--seed", type=int, default=0, help="of everything random (default: %(default)s)")
     add("--device", default="cpu", metavar="cpu|cuda", help="where the whole step runs (default: cpu)")
     add("--resume", action="store_true", help="go on from the last checkpoint, if there is one")
@@ -88,8 +81,6 @@ def check_options(options: argparse.Namespace) -> None:
         raise ValueError(f"--model {options.model}: learns from simulations; add --dataset FILE")
     if options.recipe and simulated:
         raise ValueError(f"--recipe {options.recipe}: {options.model} has its own; leave out --recipe")
-    if options.patience and not options.validation:
-        raise ValueError(f"--patience {options.patience}: add --validation NAME, a motion to stop by")
     if options.out.is_dir():
         raise ValueError(f"--out {options.out}: is a folder; name a file")
     try:
@@ -107,16 +98,14 @@ def choose_garment(options: argparse.Namespace, body: Body) -> Garment:
     return read_garment(parse_garment_file(options.garment), body)
 
 
-def choose_motions(
-    options: argparse.Namespace, simulated: Sequence[Motion] = ()
-) -> tuple[list[Motion], list[Motion]]:
-    """Return the motions to train on and those to validate with. Raises ValueError for an unknown name.
+def choose_motions(options: argparse.Namespace, simulated: Sequence[Motion] = ()) -> list[Motion]:
+    """Return the motions to train on. Raises ValueError for an unknown name.
 
     The simulated motions of a data set take the place of the library's. Test clips of a published split
     are left out.
     """
     from snug.motion.files import load_motions
-    from snug.motion.library import CONTROL, DYNAMIC_VALIDATION, TRAIN, VALIDATION, make_motion
+    from snug.motion.library import TRAIN, make_motion
 
     motions = list(simulated) or [make_motion(name) for name in TRAIN]
     if options.motions:
@@ -126,18 +115,10 @@ def choose_motions(
         if absent := reading.absent([motion.name for motion in read]):
             print(absent, file=sys.stderr)
     names = [motion.name for motion in motions]
-    # Of the library; they never train.
-    others = [name for name in (*VALIDATION, *DYNAMIC_VALIDATION, *CONTROL) if name not in names]
-    for option, known in (("hold_out", names), ("validation", [*names, *others])):
-        for name in getattr(options, option):
-            if name not in known:
-                option = option.replace("_", "-")
-                raise ValueError(f"--{option} {name}: no such motion among {', '.join(known)}")
-    left_out = {*options.hold_out, *options.validation}
-    training = [motion for motion in motions if motion.name not in left_out]
-    validating = [motion for motion in motions if motion.name in options.validation]
-    validating += [make_motion(name) for name in others if name in options.validation]
-    return training, validating
+    for name in options.hold_out:
+        if name not in names:
+            raise ValueError(f"--hold-out {name}: no such motion among {', '.join(names)}")
+    return [motion for motion in motions if motion.name not in options.hold_out]
 
 
 @command("snug.train", goes_on="--resume goes on from there")
@@ -152,7 +133,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     from snug.training.checkpoint import Checkpoint
     from snug.training.simulated_data import read_data_set
     from snug.training.train_network import train_network
-    from snug.training.validation import Validation
 
     check_options(options)
     torch.set_num_threads(1)
@@ -162,8 +142,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     trajectories = None
     if options.dataset:
         simulated, trajectories = read_data_set(Path(options.dataset), body, dressed.garment)
-    motions, held_out = choose_motions(options, simulated)
-    for motion in [*motions, *held_out] if options.motions else ():
+    motions = choose_motions(options, simulated)
+    for motion in motions if options.motions else ():
         print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
     out = options.out
     checkpoint = Checkpoint(
@@ -173,14 +153,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if options.resume and out.is_file() and not checkpoint.path.is_file():
         print(f"{out}: is there, and no checkpoint beside it; nothing to resume")
         return 0
-    validation = None
-    if held_out:
-        validation = Validation(motions=held_out, patience=options.patience, trajectories=trajectories)
     out.parent.mkdir(parents=True, exist_ok=True)
     model = train_network(
         options.model, dressed, motions, steps=options.steps, seed=options.seed,
         recipe=RECIPES.get(options.recipe), trajectories=trajectories, device=options.device,
-        checkpoint=checkpoint, validation=validation,
+        checkpoint=checkpoint,
     )  # fmt: skip
     print(f"{dressed.garment.name}: {dressed.vertices} vertices, {len(motions)} motions")
     print_summary(model)
@@ -190,7 +167,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def print_summary(model: TrainedModel) -> None:
-    """Print the last losses, high windows, the best validation and the size of a model."""
+    """Print the last losses, high windows and the size of a model."""
     terms = [f"{name} {value:.4g}" for name, value in model.history[-1].items()
              if name not in ("step", "seconds")]  # fmt: skip
     print(f"recipe {model.recipe.name}, {model.summary['training_frames']} frames")
@@ -199,8 +176,6 @@ def print_summary(model: TrainedModel) -> None:
         if window["action"] == "gradient clipped":  # which is part of the recipe
             continue
         print("step {step}: {window} at {joules} {unit}, {action}".format(**window, unit=model.unit))
-    if validation := model.summary.get("validation"):
-        print("validation {best:.4g} at step {best_step}, whose weights are kept".format(**validation))
     print(f"{model.steps} steps in {model.seconds:.0f} s after {model.setup_seconds:.0f} s of preparation, "
           f"{model.megabytes:.1f} MB")  # fmt: skip
 

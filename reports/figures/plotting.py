@@ -51,8 +51,6 @@ KNOWN = {
     "pbns-paper": Style("", "#00725A", "^", "--"),
     "tailornet": Style("", "#661100", "H", ":"),
     "santesteban2019": Style("", "#AA4499", "d", (0.0, (1.0, 1.0))),
-    "nearest-poses": Style("", "#A6761D", "8", ":"),
-    "pose-regression": Style("", "#7570B3", "h", ":"),
     "handles": Style("Handles", "#CC6677", "p", "--"),
     "supervised": Style("", "#E69F00", "s", (0.0, (6.0, 1.5))),
     "snug": Style("", "#0072B2", "o"),

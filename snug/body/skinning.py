@@ -73,21 +73,6 @@ def unskin(posed: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
     return torch.linalg.solve(blended[..., :3], (posed - blended[..., 3])[..., None])[..., 0]
 
 
-def unskin_damped(
-    posed: Tensor, rest: Tensor, weights: Tensor, transforms: Tensor, damping: float
-) -> Tensor:
-    """Return the offsets o of `rest` that minimise |skin(rest + o) - posed|^2 + damping |o|^2 at each vertex.
-
-    Where joints turned far from each other blend to a map that is nearly singular, as in an armpit, what
-    `unskin` returns may lie metres away, and means nothing in any other pose. The damping is to be seen
-    beside 1, the square of the stretch of a rotation. Shapes as in `skin`; rest (V, 3) [m].
-    """
-    linear = _blended(weights, transforms)[..., :3]
-    missing = posed - skin(rest, weights, transforms)
-    normal = linear.mT @ linear + damping * torch.eye(3, dtype=linear.dtype, device=linear.device)
-    return torch.linalg.solve(normal, linear.mT @ missing[..., None])[..., 0]
-
-
 def _blended(weights: Tensor, transforms: Tensor) -> Tensor:
     """Return the blended transform (..., V, 3, 4) of each vertex."""
     return (weights @ transforms.flatten(-2)).unflatten(-1, (3, 4))

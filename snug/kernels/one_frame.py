@@ -11,9 +11,8 @@ import numpy as np
 from reference_sim.kernels.kernel_cache import njit
 
 # Kinds of operations: y = W x + b, y += that, its positive part, and that times its sigmoid (SiLU); a
-# cell; squared distances of x from the rows of W; the mean of the rows of W that have the least
-# distances; offsets of a block of vertices by one handle, and those added; y += x.
-PRODUCT, ADDED, RECTIFIED, SMOOTH, CELL, DISTANCES, NEAREST, HANDLE, HANDLE_ADDED, SUM = range(10)
+# cell; offsets of a block of vertices by one handle, and those added; y += x.
+PRODUCT, ADDED, RECTIFIED, SMOOTH, CELL, HANDLE, HANDLE_ADDED, SUM = range(8)
 ROWS, COLUMNS = 4, 32  # a matrix has multiples of these: rows at once, and numbers in vector registers
 VERTEX_BLOCK = 64  # vertices that are skinned together
 FAST = {"reassoc", "contract", "nsz"}  # a number that is not finite stays so
@@ -84,10 +83,9 @@ def run_frame(
 
     operations (n, 7): kind, rows, columns, and where its weights, terms, what it reads and what it writes
     begin in `weights`, `terms` and `work`, which are flat; of a cell rows is its size and columns where
-    its recurrent part begins; of SUM rows is its size; of NEAREST the terms are the number of rows that
-    share, what is added to each distance, and a factor; of HANDLE rows is how far apart two coordinates
-    of a vertex are written, and columns how far apart their numbers are read. terms: mean and spread of
-    the features (D,), which are normalised into work[:D], then factors and biases of each matrix. The
+    its recurrent part begins; of SUM rows is its size; of HANDLE rows is how far apart two coordinates of
+    a vertex are written, and columns how far apart their numbers are read. terms: mean and spread of the
+    features (D,), which are normalised into work[:D], then factors and biases of each matrix. The
     offsets are the last of `work`. The others are those of skin_frame.
     """
     inputs = len(features)
@@ -101,10 +99,6 @@ def run_frame(
         elif kind == SUM:
             for j in range(rows):
                 y[j] += source[j]
-        elif kind == DISTANCES:
-            _distances(weights[operations[i, 3] :], source, y, rows, columns)
-        elif kind == NEAREST:
-            _nearest(weights[operations[i, 3] :], terms[operations[i, 4] :], source, y, rows, columns)
         elif kind in (HANDLE, HANDLE_ADDED):
             _handle(kind == HANDLE_ADDED, terms[operations[i, 4] :], source, y, rows, columns)
         else:
@@ -144,35 +138,6 @@ def _multiply(
             elif kind == SMOOTH:
                 value *= _sigmoid(value)
             y[j] = value
-
-
-@njit(cache=True, fastmath=FAST, error_model="numpy")
-def _distances(weights: np.ndarray, x: np.ndarray, y: np.ndarray, rows: int, columns: int) -> None:
-    for j in range(rows):
-        w, squared = weights[j * columns :], _ZERO
-        for k in range(columns):
-            difference = w[k] - x[k]
-            squared += difference * difference
-        y[j] = squared
-
-
-@njit(cache=True, fastmath=FAST, error_model="numpy")
-def _nearest(
-    weights: np.ndarray, terms: np.ndarray, distances: np.ndarray, y: np.ndarray, rows: int, columns: int
-) -> None:
-    """Write the mean of the rows with the least distances, each by the inverse of its own, into y."""
-    total = _ZERO
-    y[:columns] = _ZERO
-    for _ in range(int(terms[0])):
-        j = np.argmin(distances[:rows])
-        share = _ONE / (distances[j] + terms[1])
-        w, factor = weights[j * columns :], share * terms[2]
-        for k in range(columns):
-            y[k] += factor * w[k]
-        total += share
-        distances[j] = np.inf
-    for k in range(columns):
-        y[k] /= total
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")

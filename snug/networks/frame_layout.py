@@ -17,10 +17,8 @@ from snug.kernels.one_frame import (
     ADDED,
     CELL,
     COLUMNS,
-    DISTANCES,
     HANDLE,
     HANDLE_ADDED,
-    NEAREST,
     PRODUCT,
     RECTIFIED,
     ROWS,
@@ -103,20 +101,6 @@ class FramePlan:
             matrix, bias = _numbers_of(layer)
             matrix, bias = np.pad(matrix, ((0, 3), (0, 0)))[rows], np.pad(bias, (0, 3))[rows]
             self._product(kind, matrix, bias, x, self._used, scale=self._scale)
-
-    def add_nearest(self, poses: Tensor, frames: Tensor, x: slice, neighbours: int, near: float) -> None:
-        """Add the offsets of the frames (F, 3V) whose poses (F, D) are nearest to x; to be called last.
-
-        They weigh 1 / (squared distance + near).
-        """
-        nothing = torch.zeros(len(poses)).numpy()
-        distances = self._place(len(poses))
-        self._product(DISTANCES, poses.detach().numpy(), nothing, x, distances.start)
-        matrix = np.pad(frames.detach().numpy(), ((0, 0), (0, 3)))[:, self._rows()]
-        first = sum(map(len, self._matrices)), sum(map(len, self._terms))
-        self._operations.append((NEAREST, *matrix.shape, *first, distances.start, self._used))
-        self._matrices.append(matrix.ravel())
-        self._terms.append(np.array([neighbours, near, self._scale], np.float32))
 
     def add_handles(self, functions: Tensor, x: slice) -> None:
         """Add the offsets of handles whose numbers lie at x, with shape functions (V, B, 4); called last.

@@ -87,10 +87,6 @@ class GarmentNetwork(nn.Module):
         """Return the state after frames with features (N, T, D), for a network with `lead`."""
         raise NotImplementedError
 
-    def learn(self, features: Tensor, offsets: Tensor) -> None:
-        """Learn offsets (F, V, 3) [m] of frames with features (F, D), for a kind that is `fitted`."""
-        raise NotImplementedError
-
     def last_layers(self) -> tuple[nn.Linear, ...]:
         """Return the layers whose sum the offsets are."""
         return (self.offsets,)

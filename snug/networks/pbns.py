@@ -14,21 +14,20 @@ from snug.kernels.gru import run_linear
 from snug.networks.frame_layout import FramePlan
 from snug.networks.garment_network import GarmentNetwork, perceptron
 
+WIDTHS = (32,) * 4
+
 
 class PoseSpaceDeformation(GarmentNetwork):
     """A perceptron and a matrix of deformations, without a state."""
 
     feature_set = "pose"
     sequential = False
-    widths: tuple[int, ...] = (32,) * 4
-    activation: type[nn.Module] = nn.ReLU
-    constant = False  # whether there is a deformation in every pose
 
     def __init__(self, inputs: int, vertices: int) -> None:
         super().__init__(inputs, vertices)
-        self.activations = perceptron(inputs, *self.widths, activation=self.activation)
+        self.activations = perceptron(inputs, *WIDTHS)
         # The deformation matrix, (width, V, 3) flattened.
-        self.offsets = nn.Linear(self.widths[-1], 3 * vertices, bias=self.constant)
+        self.offsets = nn.Linear(WIDTHS[-1], 3 * vertices, bias=False)
 
     def forward(self, features: Tensor, state: None = None) -> tuple[Tensor, None]:
         """Return offsets (N, T, V, 3) [m] and no state."""

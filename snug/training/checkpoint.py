@@ -13,9 +13,8 @@ from torch import Tensor
 
 from snug.networks.tensor_file import TensorFileError, read_tensors, write_tensors
 from snug.training.optimisation_step import Trainer
-from snug.training.validation import Validator
 
-CHECKPOINT_FORMAT = "snug-checkpoint-8"
+CHECKPOINT_FORMAT = "snug-checkpoint-9"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,12 +74,18 @@ class Checkpoint:
         return tensors, header
 
 
-def describe_run(trainer: Trainer, validator: Validator | None, **facts: Any) -> dict[str, Any]:
+def describe_run(trainer: Trainer, **facts: Any) -> dict[str, Any]:
     """Return the facts that must be equal for two runs to be the same run."""
     digest, data, dressed = hashlib.sha256(), trainer.data, trainer.dressed
-    sets, body = [data, validator.data] if validator else [data], dressed.body
-    tensors = [part for of in sets for part in (of.features, of.transforms, of.ahead)]
-    tensors += [data.rest, trainer.weights, *([trainer.targets.vertices] if trainer.targets else [])]
+    body = dressed.body
+    tensors = [
+        data.features,
+        data.transforms,
+        data.ahead,
+        data.rest,
+        trainer.weights,
+        *([trainer.targets.vertices] if trainer.targets else []),
+    ]
     shape = (body.template, body.faces, body.shape_directions, body.joint_directions)
     for array in (*(tensor.cpu().numpy() for tensor in tensors), *shape, dressed.cloth.Dm_inverse):
         digest.update(array.tobytes())

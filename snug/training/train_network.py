@@ -1,6 +1,6 @@
 """Train a network, or make an untrained one. The command is snug.train.
 
-Between the steps of a training come its log, validation, early stop and checkpoints.
+Between the steps of a training come its log and checkpoints.
 """
 
 from __future__ import annotations
@@ -12,28 +12,19 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import torch
-from torch import Tensor
 
 from reference_sim.command_line import progress_bar
-from snug.body.skinning import skin, unskin_damped
 from snug.kinds import find_kind
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
-from snug.networks.garment_network import make_network
-from snug.networks.tensor_file import select_tensors
 from snug.networks.trained_model import TrainedModel, digest_of_triangles
 from snug.recipe import Recipe
 from snug.training.captured_step import CapturedTrainer
 from snug.training.checkpoint import Checkpoint, describe_run
 from snug.training.device import find_device
 from snug.training.optimisation_step import Trainer, start_network
-from snug.training.simulated_data import Trajectories, relative_vertices, vertex_loss
+from snug.training.simulated_data import Trajectories
 from snug.training.training_set import TrainingSet
-from snug.training.validation import Validation, Validator
-
-DAMPING = 0.01  # of the offsets that fitted networks learn, see unskin_damped
-PIECE = 256  # frames whose loss is taken at once
 
 
 class TrainingLoop:
@@ -50,19 +41,13 @@ class TrainingLoop:
         progress: bool = False,
         every: int = 50,
         checkpoint: Checkpoint | None = None,
-        validation: Validation | None = None,
         setup_seconds: float = 0.0,
     ) -> None:
         self.trainer, self.log, self.every, self.checkpoint = trainer, log, every, checkpoint
         self.progress = progress
-        self.patience = validation.patience if validation else 0
-        self.validator = Validator(trainer, validation) if validation else None
-        self.validated_every = validation.every if validation else 0
         self.setup_seconds, self.done, self.seconds = setup_seconds, 0, 0.0
         self.history: list[dict[str, float]] = []
         self.recent: list[dict[str, float]] = []
-        self.best: dict[str, Tensor] = {}
-        self.best_value, self.best_step, self.last_value = float("inf"), 0, float("nan")
         self._started = self._saved = time.perf_counter()
 
     def run(self) -> TrainedModel:
@@ -79,7 +64,7 @@ class TrainingLoop:
             total=trainer.steps, initial=self.done, desc=f"train {trainer.kind}", unit="step",
             disable=not self.progress,
         ) as bar:  # fmt: skip
-            while self.done < trainer.steps and not self._out_of_patience():
+            while self.done < trainer.steps:
                 self.recent.append(trainer.step(self.done))
                 self.done += 1
                 bar.update()
@@ -88,9 +73,7 @@ class TrainingLoop:
 
     def _between_steps(self, bar: Any) -> None:
         last = self.done == self.trainer.steps
-        if self.validator and (self.done % self.validated_every == 0 or last):
-            self._validate(self.validator)
-        if len(self.recent) == self.every or last or self._out_of_patience():
+        if len(self.recent) == self.every or last:
             row = self._row()
             self.history.append(row)
             bar.set_postfix(loss=f"{row['loss']:.4g}", refresh=False)
@@ -104,36 +87,19 @@ class TrainingLoop:
         """Return the row of the history over the recent steps, and begin the next."""
         row = {"step": self.done, "seconds": self.seconds + time.perf_counter() - self._started}
         row |= {name: float(np.mean([r[name] for r in self.recent])) for name in self.recent[0]}
-        if not np.isnan(self.last_value):
-            row["validation"], self.last_value = self.last_value, float("nan")
         self.recent = []
         return row
 
-    def _validate(self, validator: Validator) -> None:
-        self.last_value = validator.value()
-        if self.last_value < self.best_value:
-            self.best_value, self.best_step = self.last_value, self.done
-            weights = self.trainer.network.state_dict()
-            self.best = {name: tensor.clone() for name, tensor in weights.items()}
-
-    def _out_of_patience(self) -> bool:
-        waited = self.done - self.best_step
-        return self.patience > 0 and waited >= self.patience * self.validated_every
-
     def _identity(self) -> dict[str, Any]:
-        names = self.validator.data.names if self.validator else []
-        watched = [names, self.validated_every, self.patience]
-        return describe_run(self.trainer, self.validator, every=self.every, validation=watched)
+        return describe_run(self.trainer, every=self.every)
 
     def _save(self, checkpoint: Checkpoint) -> None:
         tensors, facts = self.trainer.state()
-        tensors.update({f"best.{name}": tensor for name, tensor in self.best.items()})
         state = {
             "done": self.done,
             "seconds": self.seconds + time.perf_counter() - self._started,
             "history": self.history,
             "recent": self.recent,
-            "validation": [self.best_value, self.best_step, self.last_value],
             "trainer": facts,
         }
         checkpoint.write(self._identity(), tensors, state)
@@ -142,26 +108,19 @@ class TrainingLoop:
     def _resume(self) -> None:
         if self.checkpoint is None or (stored := self.checkpoint.read(self._identity())) is None:
             return
-        (tensors, state), device = stored, self.trainer.device
+        tensors, state = stored
         self.trainer.resume(tensors, state["trainer"])
-        self.best = {name: tensor.to(device) for name, tensor in select_tensors(tensors, "best").items()}
-        self.best_value, self.best_step, self.last_value = state["validation"]
         self.done, self.seconds = state["done"], state["seconds"]
         self.history, self.recent = state["history"], state["recent"]
 
     def model(self) -> TrainedModel:
-        """Return the model after the steps done so far, with the best weights if it was validated."""
+        """Return the model after the steps done so far."""
         trainer = self.trainer
         summary = {
             **trainer.guard.summary,
             "epochs": trainer.epoch,
             "training_frames": trainer.data.frames,
         }
-        if self.validator:
-            if self.best:
-                trainer.network.load_state_dict(self.best)
-            summary["validation"] = {"motions": self.validator.data.names, "best": self.best_value,
-                                     "best_step": self.best_step, "stopped_at": self.done}  # fmt: skip
         return TrainedModel(
             trainer.kind, trainer.network.cpu().eval(), trainer.recipe, seed=trainer.seed, steps=self.done,
             seconds=self.seconds + time.perf_counter() - self._started, setup_seconds=self.setup_seconds,
@@ -185,12 +144,8 @@ def train_network(
     device: str = "cpu",
     kernels: bool | None = None,
     checkpoint: Checkpoint | None = None,
-    validation: Validation | None = None,
 ) -> TrainedModel:
     """Train one network for a number of steps; on a CPU equal arguments give equal weights, bit for bit.
-
-    Kinds that are fitted in one go (snug.networks.fitted) take no steps: of all that concerns steps,
-    nothing is used.
 
     Args:
         model_kind: one of snug.kinds.KINDS, which says whether energies or simulated vertices
@@ -209,7 +164,6 @@ def train_network(
         kernels: closed forms in numba (the default on a CPU) or the definitions of the energies in torch
             (everywhere else).
         checkpoint: where checkpoints are written; the caller deletes it after storing the model.
-        validation: held-out motions; the weights that do best on them are kept.
 
     Raises:
         ValueError: TrainingError, RecipeError, DeviceError or TensorFileError, naming what is
@@ -220,51 +174,16 @@ def train_network(
     start = time.perf_counter()
     gc.collect()  # an earlier training refers to itself, and holds gigabytes
     recipe = recipe or find_kind(model_kind).recipe
-    if find_kind(model_kind).fitted:
-        return _fitted_model(model_kind, dressed, motions, trajectories, seed=seed, recipe=recipe)
     on = find_device(device)
     trainer = (CapturedTrainer if on.type == "cuda" else Trainer)(
         model_kind, dressed, motions, steps=steps, seed=seed, recipe=recipe, trajectories=trajectories,
         device=on, kernels=kernels,
     )  # fmt: skip
     loop = TrainingLoop(
-        trainer, log=log, progress=progress, every=every, checkpoint=checkpoint, validation=validation,
+        trainer, log=log, progress=progress, every=every, checkpoint=checkpoint,
         setup_seconds=time.perf_counter() - start,
     )  # fmt: skip
     return loop.run()
-
-
-def _fitted_model(
-    model_kind: str, dressed: DressedBody, motions: Sequence[Motion], trajectories: Trajectories | None, *,
-    seed: int, recipe: Recipe,
-) -> TrainedModel:  # fmt: skip
-    """Fit a network to the offsets of simulated frames; its loss is that of the posed vertices."""
-    begun = time.perf_counter()
-    kind = find_kind(model_kind)
-    kind.check(recipe)
-    data = TrainingSet(dressed, motions, recipe, features=kind.network.feature_set, sequences=False)
-    vertices = relative_vertices(dressed, motions, trajectories)
-    weights = dressed.weights(recipe.smoothing)
-    pins = dressed.garment.pins
-    network = make_network(
-        model_kind, data.features.shape[1], dressed.vertices, recipe, seed=seed, pins=pins
-    )
-    ready = time.perf_counter()
-    network.learn(data.features, unskin_damped(vertices, data.rest, weights, data.transforms, DAMPING))
-    seconds = time.perf_counter() - ready
-    loss = 0.0
-    with torch.no_grad():
-        for rows in torch.arange(data.frames).split(PIECE):
-            posed = skin(
-                network(data.features[rows, None])[0][:, 0] + data.rest, weights, data.transforms[rows]
-            )
-            loss += float(vertex_loss(posed, vertices[rows]).sum()) / data.frames
-    return TrainedModel(
-        model_kind, network.eval(), recipe, seed=seed, steps=1, seconds=seconds, setup_seconds=ready - begun,
-        history=[{"step": 1, "seconds": seconds, "loss": loss}],
-        summary={"training_frames": data.frames}, unit=kind.unit, fps=1.0 / data.dt,
-        triangles=digest_of_triangles(dressed.garment.faces),
-    )  # fmt: skip
 
 
 def untrained_model(

@@ -7,7 +7,6 @@ import pytest
 import torch
 from safetensors.torch import save_file
 
-from snug.motion.library import TRAIN
 from snug.named_recipes import PAPER, SUPERVISED
 from snug.networks import trained_model
 from snug.networks.trained_model import ModelFileError, TrainedModel
@@ -75,7 +74,6 @@ def test_files_that_are_no_models_are_named(tmp_path, monkeypatch):
         ({"steps": 0}, "steps=0"),
         ({"motions": [swaying(30), swaying(30, fps=60.0)]}, "one frame rate"),
         ({"recipe": SUPERVISED}, "physics_weight=.*: snug learns no simulated vertices"),
-        ({"kind": "nearest-poses", "recipe": SUPERVISED}, "nearest-poses learns no simulated vertices"),
         ({"kind": "gnn"}, r"'gnn'.*snug, pbns, supervised"),
     ],
 )
@@ -95,16 +93,10 @@ def test_paper_recipe_varies_the_body(monkeypatch):
     assert betas.shape == (8 * 16, 10) and 2.5 < betas.max() <= 3 and -3 <= betas.min() < -2.5
 
 
-def test_motions_that_validate_do_not_train():
-    training, validation = choose_motions(parse_options(["--validation", "kick", "--validation", "bow"]))
-    assert [motion.name for motion in validation] == ["kick", "bow"]
-    assert [motion.name for motion in training] == list(TRAIN)
-
-
 def test_test_clips_of_a_published_split_do_not_train(tmp_path, capsys):
     for name in ("01_01", "02_04", "05_16"):
         np.savez(tmp_path / f"{name}.npz", poses=np.zeros((12, 72)), trans=np.zeros((12, 3)), fps=30.0)
-    [training], _ = choose_motions(parse_options(["--motions", f"{tmp_path},split=snug"]))
+    [training] = choose_motions(parse_options(["--motions", f"{tmp_path},split=snug"]))
     assert training.name == "02_04"
     assert "54 of 56 clips are absent: 07_02, 55_27, 104_54, 02_05," in capsys.readouterr().err
 
@@ -114,9 +106,8 @@ def test_test_clips_of_a_published_split_do_not_train(tmp_path, capsys):
     [
         ("-o {0}/file/model.safetensors", "file"),
         ("--seed -1", "seed=-1: give a number from 0"),
-        ("--patience 3", "--patience 3: add --validation NAME"),
         ("--motions {0}/nowhere", "nowhere"),
-        ("--validation dance_turn", "no such motion among 07_01"),
+        ("--hold-out dance_turn", "no such motion among 07_01"),
     ],
 )
 def test_command_line_refuses_what_it_could_not_do(arguments, hint, refused, tmp_path):
