@@ -11,7 +11,7 @@ import json
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -80,7 +80,7 @@ def shipped_garment(plan: Plan) -> dict[str, Garment]:
     """Return the T-shirt by its name, as it is tailored to the package's body; empty for another one."""
     if plan.inputs.body or plan.study.sizes.garment_vertices != VERTICES or not GARMENT.is_file():
         return {}
-    arrays = read_arrays(GARMENT)
+    arrays: dict[str, Any] = read_arrays(GARMENT)
     loops = {name.removeprefix(LOOP): arrays.pop(name) for name in list(arrays) if name.startswith(LOOP)}
     return {TSHIRT: Garment(TSHIRT, **arrays, loops=loops)}
 
@@ -88,8 +88,9 @@ def shipped_garment(plan: Plan) -> dict[str, Garment]:
 def write_garment(garment: Garment) -> None:
     """Write the file that `shipped_garment` reads."""
     names = ("rest_positions", "faces", "body_vertices", "skinning_weights")
+    arrays: dict[str, Any] = {name: getattr(garment, name) for name in names}
     loops = {f"{LOOP}{name}": loop for name, loop in garment.loops.items()}
-    np.savez_compressed(GARMENT, **{name: getattr(garment, name) for name in names}, **loops)
+    np.savez_compressed(GARMENT, **arrays | loops)
 
 
 def key_of(scene: Scene, plan: Plan, built: BuiltScene) -> str:

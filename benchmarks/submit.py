@@ -15,7 +15,7 @@ from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
 from datetime import date
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -246,7 +246,7 @@ def write_scores(entry: Entry, run: RunFolder) -> int:
         f"{flat(scene)}-seed{seed}": Trajectory.load(run.trajectory_path(scene, method, seed)).positions
         for scene, method, seed in cells
     }
-    samples = {name: sampled(positions) for name, positions in frames.items()}
+    samples: dict[str, Any] = {name: sampled(positions) for name, positions in frames.items()}
     find_copies(entry, samples)
     config, folder = run.read_config(), entry.scores
     folder.path.mkdir(exist_ok=True)

@@ -152,7 +152,7 @@ def entries_tables(
     groups: dict[tuple[str, tuple[str, ...]], list[Scored]] = {(run.protocol, tuple(sorted(full))): []}
     for entry in entries:
         groups.setdefault((entry.run.protocol, entry.scenes), []).append(entry)
-    tables = []
+    tables: list[tuple[Table, Sequence[Scored]]] = []
     for (protocol, scenes), scored in sorted(
         groups.items(), key=lambda item: (-len(item[0][1]), item[0])
     ):

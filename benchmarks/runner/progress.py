@@ -6,7 +6,7 @@ import math
 import sys
 import threading
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 
 from benchmarks.plan.cell import TaskId
@@ -39,7 +39,7 @@ class Progress:
         self.workers = workers
         self.since: dict[TaskId, float] = {}  # batch -> when that of its tasks began which is at work
         # Of a kind, of its tasks that have ended [s].
-        self.seconds, self.expected = Counter[str](), Counter[str]()
+        self.seconds, self.expected = defaultdict[str, float](float), defaultdict[str, float](float)
         self.compiling = COMPILING if compilation_is_due() else 0.0
         self.shown, self.stage = math.inf, ""
         self._stopped = threading.Event()
