@@ -78,8 +78,8 @@ def carry_out(plan: Plan, *, dry_run: bool = False) -> int:
         dressed = bool(plan.scenes) and all(scene.dressed for scene in plan.scenes)
         start_loading(*(LOADED_BY_DRESSED if dressed else ()))
         assets = check_methods(plan)
-        print(plan.study.question, file=sys.stderr)
         with held(plan.folder):
+            print(plan.study.question, file=sys.stderr)
             return execute(plan, assets)
     except (RunRefused, DeclarationError, RollOutFileError) as error:
         print(f"{PROGRAM}: {error}", file=sys.stderr)

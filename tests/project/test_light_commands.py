@@ -26,7 +26,7 @@ MEASURED = LIBRARIES | {"vtk", "vtkmodules", "pandas", "skfem", "matplotlib"}
 LIGHT = [
     ("benchmarks.run --help", "examples:", MEASURED),
     ("benchmarks.run --list", "hanging_sheet", MEASURED),
-    ("benchmarks.run --dry-run", "hanging_sheet", MEASURED),
+    ("benchmarks.run --dry-run", "tshirt/01_01_a", MEASURED),
     ("reference_sim.simulate --help", "--obstacle", {"torch", "numba", "igl", "meshio", "h5py"}),
     ("snug.check --help", "usage:", LIBRARIES | {"numpy"}),
     ("snug.train --help", "examples:", {"torch"}),

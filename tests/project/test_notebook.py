@@ -42,7 +42,7 @@ def test_the_cells_run_and_snug_is_nearer_the_simulation_than_after_a_minute(
     assert list(energies) == ["SNUG", "SNUG, a minute", "Simulation"]
     assert energies["Simulation"] < energies["SNUG"] < energies["SNUG, a minute"]
     assert names["simulated"].status == "converged" and len(names["figure"].axes) == 3
-    assert capsys.readouterr().out.startswith("5300 steps on 34 motions, commit ")
+    assert capsys.readouterr().out.startswith("16000 steps on 34 motions, commit ")
 
 
 @pytest.mark.slow

@@ -39,6 +39,7 @@ def test_a_second_run_in_the_same_folder_is_refused_in_one_line(tmp_path, monkey
     def execute(plan, assets):
         if not answers:
             answers.append(None)
+            capsys.readouterr()
             answers.append(run.main(options))
         return 0
 
@@ -157,7 +158,7 @@ def case(function: str, seconds: float = 60.0, **declared) -> Case:
 
 def rows_of_cases(folder, *cases: Case, processes: bool = False):
     plan = plan_of(folder, cases=cases)
-    runner = finish(plan, "validation", processes=processes)
+    runner = finish(plan, "known answers", processes=processes)
     return rows_of(plan, runner.tasks, runner.outcomes), runner
 
 
