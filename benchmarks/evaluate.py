@@ -156,17 +156,14 @@ def _steps_beside(roll_out: RollOut) -> Iterator[None]:
         yield
         return
     fork: Any = get_context("fork")  # what the process needs is there, and nothing is loaded again
-    with ProcessPoolExecutor(1, fork, _remember, (roll_out,)) as pool:
+    _remembered[:] = [roll_out]
+    with ProcessPoolExecutor(1, fork) as pool:
         roll_out.group.keep(gap_scale, pool.submit(_of_remembered, gap_scale))
         roll_out.keep(judge_steps, pool.submit(_of_remembered, judge_steps))
         yield
 
 
 _remembered: list[RollOut] = []
-
-
-def _remember(roll_out: RollOut) -> None:
-    _remembered[:] = [roll_out]
 
 
 def _of_remembered(make: Callable[[Any], Any]) -> Any:

@@ -40,12 +40,8 @@ TSHIRT, VERTICES = "tshirt", 1000  # the garment of the scenes, and about how ma
 METHODS = ("simulation", "skinning", "snug", "pbns")  # whose metrics are shipped
 TRAINED = METHODS[2:]
 STEP = 2.0**-18  # [m] to which positions are rounded
-PARTS = (
-    "scenes",
-    "materials",
-    "metrics",
-    "reference",
-)  # of the protocol: what a scene's numbers depend on
+# Of the protocol: what a scene's numbers depend on.
+PARTS = ("scenes", "materials", "metrics", "reference")
 SAME = 1e-4  # [rad], [m] by which one motion may differ from another processor's
 
 

@@ -1,6 +1,6 @@
 """python -m benchmarks.run: the main job, from a body and motions to a report.
 
-This file is the command alone: a study, its plan, stages in order, an exit status. Nothing heavy is
+This file is the command alone: a study, its plan, an exit status. Nothing heavy is
 imported before the plan is made, so that --help and --list answer at once.
 """
 

@@ -184,14 +184,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(f"{entry.path}: nothing found; {len(entry.scenes)} of {len(SCENES)} scenes")
             return 0
         from benchmarks.evaluate import evaluate  # loads the simulator
-        from reports.build import build_row, save_still
+        from reports.build import build_row
 
-        evaluate(plan)
-        run = RunFolder(plan.folder)
-        count = write_scores(entry, run)
-        save_still(run.path, entry.name, entry.scores.path / PICTURE)
-        note_files(entry)
-        print(build_row(run.path))
+        count = write_scores(entry, evaluate(plan).folder)
+        print(build_row(plan.folder))
     print(f"{entry.path}: {count} rows in {entry.scores.rows_path}")
     return 0
 
@@ -227,6 +223,7 @@ def write_scores(entry: Entry, run: RunFolder) -> int:
     """
     from benchmarks.metrics import find_metric
     from reference_sim import Trajectory
+    from reports.build import save_still
 
     rows = [
         replace(row, commit="", hardware="")
@@ -252,10 +249,12 @@ def write_scores(entry: Entry, run: RunFolder) -> int:
     folder.path.mkdir(exist_ok=True)
     folder.write_rows(rows)
     np.savez(folder.path / SAMPLED, **samples)
+    save_still(run.path, entry.name, folder.path / PICTURE)
     folder.write_config({
         "protocol": {"number": NUMBER, "digest": DIGEST}, **{name: config.get(name) for name in KEPT},
         "date": date.today().isoformat(), "metadata": asdict(entry.metadata),
         "roll_outs": {name: digest(positions) for name, positions in frames.items()},
+        "entry": entry.digests(),
     })  # fmt: skip
     return len(rows)
 
@@ -291,12 +290,6 @@ def find_copies(entry: Entry, samples: dict[str, Floats]) -> None:
                 raise EntryError(
                     f"{entry.path}: {name}: its frames are those of {' '.join(whose)}, {way}"
                 )
-
-
-def note_files(entry: Entry) -> None:
-    """Write the digests of all that was scored into run.json."""
-    config = entry.scores.read_config()
-    entry.scores.write_config({**config, "entry": entry.digests()})
 
 
 if __name__ == "__main__":

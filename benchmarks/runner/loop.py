@@ -7,18 +7,13 @@ else.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import nullcontext
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from benchmarks.plan.cell import TaskId
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.executor import Batch, Executor
 from benchmarks.runner.progress import Progress
 from benchmarks.runner.task import Outcome, Task, failure
-
-if TYPE_CHECKING:
-    from benchmarks.runner.run_json import RunLog
 
 
 class Runner:
@@ -41,18 +36,14 @@ class Runner:
         refused = Outcome("failed", reason, failed=True, origin=self.cache.origin)
         self.outcomes |= dict.fromkeys(ids, refused)
 
-    def run(self, executor: Executor, log: RunLog | None = None) -> None:
-        """Do all tasks: untimed ones side by side until the others wait for timed ones, and these one by one.
-
-        log: follows the stages.
-        """
+    def run(self, executor: Executor) -> None:
+        """Do all tasks: untimed ones side by side until the others wait for timed ones, these one by one."""
         unknown = [task for task in self.tasks if task.id not in self.outcomes]
         try:
             with Progress(unknown, executor.back_end.slots) as self.progress:
                 while left := [task for task in unknown if task.id not in self.outcomes]:
                     tasks = _able(left, timed=False) or _able(left, timed=True)
-                    with log.stage(_titles(tasks), said=True) if log else nullcontext():
-                        (self._alone if tasks[0].process else self._side_by_side)(tasks, executor)
+                    (self._alone if tasks[0].process else self._side_by_side)(tasks, executor)
         finally:
             executor.close()
 
@@ -154,10 +145,6 @@ def _able(tasks: Sequence[Task], *, timed: bool) -> list[Task]:
         if bool(task.process) != timed or not others.isdisjoint((*task.needs, *task.reads)):
             others.add(task.id)
     return [task for task in tasks if task.id not in others]
-
-
-def _titles(tasks: Sequence[Task]) -> str:
-    return ", ".join(dict.fromkeys(task.stage for task in tasks))
 
 
 def _batches(tasks: Sequence[Task]) -> list[list[Task]]:

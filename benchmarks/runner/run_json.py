@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import dataclasses
 import sys
-import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import suppress
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
@@ -28,7 +27,7 @@ OF_ROWS = ("metrics", "methods", "scenes", "cases", "digests", "tasks")
 
 
 class RunLog:
-    """The configuration, the stages and the rows of one run. Making it makes the folder."""
+    """The configuration and the rows of one run. Making it makes the folder."""
 
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
@@ -65,7 +64,6 @@ class RunLog:
             "hardware": provenance.hardware(plan.study.device),
             "versions": provenance.versions(),
             "preset_values": dataclasses.asdict(plan.study.sizes),
-            "stages": [],
             "test_looks": before.get("test_looks") or [],
             # What the rows there mean, until there are others.
             **{name: before[name] for name in OF_ROWS if name in before},
@@ -76,23 +74,10 @@ class RunLog:
             self.cache.forget_all()
         self.folder.write_config(self.config)
 
-    @contextmanager
-    def stage(self, name: str, *, said: bool = False) -> Iterator[None]:
-        """Announce a stage, unless it was, and keep its wall time, also when it is interrupted."""
-        if not said:
-            print(name, file=sys.stderr, flush=True)
-        clock = time.perf_counter()
-        try:
-            yield
-        finally:
-            seconds = round(time.perf_counter() - clock, 3)
-            self.config["stages"].append({"name": name, "seconds": seconds})
-            self.folder.write_config(self.config)
-
     def open_assets(self, opened: Assets | None = None) -> Assets:
         """Body, garments and motions of the dressed scenes. Raises ValueError where one cannot be made."""
-        with self.stage("body, garments and motions"):
-            assets = opened or self.plan.open_assets()
+        print("body, garments and motions", file=sys.stderr, flush=True)
+        assets = opened or self.plan.open_assets()
         self.config["garments"] = {
             name: {"vertices": len(g.rest_positions), "material": dataclasses.asdict(g.material)}
             for name, g in assets.garments.items()

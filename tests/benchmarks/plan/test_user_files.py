@@ -88,7 +88,6 @@ def test_a_failed_cell_is_a_row_and_the_rest_goes_on(done):
     assert ended["simulation"] == ended["mine"] == ("ok", "")
     config = done.read_config()
     assert config["finished"] and config["commit"] and config["versions"]["numpy"]
-    assert {stage["name"] for stage in config["stages"]} >= {"timed methods", "metrics"}
     assert (done.path / "report.pdf").stat().st_size > 1000
     curves = read_arrays(done.curves_path("lift", "simulation"))
     assert {"energy/lift", "energy/inertia", "energy/total"} <= set(curves)
