@@ -63,7 +63,7 @@ def evaluate(plan: Plan, references: Mapping[str, Reference] | None = None) -> R
         if any(digest_of_file(packaged_network(name)) != at for name, at in shipped.networks.items()):
             notes.append(OLDER)
     kept = (c for c in plan.cells if c.method not in TRAINED or c.scene.name in found)
-    plan = replace(plan, cells=tuple(kept))
+    plan = replace(plan, cells=tuple(replace(c, entry=replace(c.entry, timed=False)) for c in kept))
     for name, reference in found.items():
         memo, start = contexts[name].memo, reference.positions[0]
         memo["scene"] = replace(memo["scene"], settle=lambda start=start: start)
@@ -77,8 +77,7 @@ def evaluate(plan: Plan, references: Mapping[str, Reference] | None = None) -> R
     for scene in plan.scenes:
         outcomes |= _of_scene(scene, plan, contexts[scene.name], found.get(scene.name))
     log.config["finished"] = now()
-    origin = {id: {**log.origin, **outcome.origin} for id, outcome in outcomes.items()}
-    outcomes = {id: replace(outcome, origin=origin[id]) for id, outcome in outcomes.items()}
+    outcomes = {id: replace(o, origin=log.origin | o.origin) for id, o in outcomes.items()}
     log.write_rows(rows_of(plan, (), outcomes))
     return log
 
@@ -138,7 +137,6 @@ def _saved(reference: Reference, cell: Cell, context: Context) -> Outcome:
     still = np.full_like(reference.positions, np.nan)
     still[:, built.dressed.garment.hem] = reference.hem
     path = folder.trajectory_path(*cell.key)
-    path.parent.mkdir(parents=True, exist_ok=True)
     times = np.arange(len(still)) * built.dt
     for positions, to in (
         (reference.positions, path),

@@ -90,28 +90,23 @@ def make_reference(name: str, out: Path) -> Path:
 
     study = replace(read_study("full:garments"), scenes=(name,), methods=references.METHODS)
     plan = make_plan(study, folder=out / flat(name))
-    cells = (replace(cell, entry=replace(cell.entry, timed=False)) for cell in plan.cells)
-    plan, run = replace(plan, cells=tuple(cells)), RunFolder(plan.folder)
-    scene = plan.scenes[0]
+    run, scene = RunFolder(plan.folder), plan.scenes[0]
     built = scene.build(assets_of(plan))
     reference = references.find_reference(scene, plan, built)
-    if not isinstance(reference, references.Reference):
+    if isinstance(reference, str):
         evaluate(plan, {})
         simulation = Trajectory.load(run.trajectory_path(name, references.METHODS[0]))
         assert built.dressed is not None
         hem = Trajectory.load(run.quasi_static_path(name)).positions[:, built.dressed.garment.hem]
         row = next(row for row in run.read_rows() if row.method == references.METHODS[0])
-        positions, hem = (
-            references.STEP * (x / references.STEP).round() for x in (simulation.positions, hem)
-        )  # as it is read
+        step = references.STEP  # as it is read
+        positions, hem = (step * (x / step).round() for x in (simulation.positions, hem))
         reference = references.Reference(positions, hem, row.status, row.reason)
     log = evaluate(plan, {name: replace(reference, metrics={})})
-    metrics = {
-        method: {
-            row.metric: row.value for row in log.rows if row.method == method and row.value is not None
-        }
-        for method in references.METHODS
-    }
+    metrics: dict[str, dict[str, float]] = {method: {} for method in references.METHODS}
+    for row in log.rows:
+        if row.value is not None:
+            metrics[row.method][row.metric] = row.value
     networks = {
         method: digest_of_file(references.packaged_network(method)) for method in references.TRAINED
     }
@@ -193,7 +188,6 @@ def save_half(model: Path, copy: Path) -> None:
 
     rounded = TrainedModel.load(model)
     rounded.network.half()
-    copy.parent.mkdir(exist_ok=True)
     rounded.save(copy)
 
 

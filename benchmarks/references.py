@@ -134,7 +134,6 @@ def write_reference(scene: Scene, plan: Plan, reference: Reference, built: Built
     names = ("status", "reason", "metrics", "origin", "networks")
     facts = {"key": key_of(scene, plan, built)} | {name: getattr(reference, name) for name in names}
     path = FOLDER / f"{flat(scene.name)}.npz"
-    path.parent.mkdir(exist_ok=True)
     with replacing(path) as temporary, temporary.open("wb") as stream:
         np.savez_compressed(
             stream, positions=_packed(beside), hem=_packed(hem), facts=np.array(json.dumps(facts)),

@@ -154,8 +154,7 @@ def plan_score(
     cells = []
     for cell in (_reference(cell, reference) for cell in plan.cells):
         suites = (*cell.suites, SOLVED_AGAIN) if cell.method == name else cell.suites
-        entry = replace(cell.entry, timed=False)
-        cells.append(replace(cell, entry=entry, suites=tuple(dict.fromkeys(suites))))
+        cells.append(replace(cell, suites=tuple(dict.fromkeys(suites))))
     return replace(plan, cells=tuple(cells))
 
 

@@ -152,7 +152,7 @@ class Entry:
                     f"name, '{self.name}', is expected"
                 )
             declared = metadata.milliseconds if mine else None
-            cells.append(replace(cell, entry=replace(cell.entry, timed=False, declared_ms=declared)))
+            cells.append(replace(cell, entry=replace(cell.entry, declared_ms=declared)))
         return replace(plan, cells=tuple(cells))
 
 
@@ -246,7 +246,6 @@ def write_scores(entry: Entry, run: RunFolder) -> int:
     samples: dict[str, Any] = {name: sampled(positions) for name, positions in frames.items()}
     find_copies(entry, samples)
     config, folder = run.read_config(), entry.scores
-    folder.path.mkdir(exist_ok=True)
     folder.write_rows(rows)
     np.savez(folder.path / SAMPLED, **samples)
     save_still(run.path, entry.name, folder.path / PICTURE)

@@ -127,19 +127,11 @@ def _tables(options: argparse.Namespace) -> Iterator[Table]:
         elif field == "rollouts":
             value = dict(map(parse_roll_out, value))
         elif field not in SINGLE:
-            value = list(split(value))
+            words = (word.strip() for given in value for word in given.split(","))
+            value = list(filter(None, words))
         if field == "seeds":
             value = [int(word) if word.removeprefix("-").isdecimal() else word for word in value]
         yield option(field, value)
-
-
-def split(values: Sequence[str]) -> tuple[str, ...]:
-    """Return repeated and comma-separated values one by one.
-
-    >>> split(["snug,pbns", "skinning"])
-    ('snug', 'pbns', 'skinning')
-    """
-    return tuple(word.strip() for value in values for word in value.split(",") if word.strip())
 
 
 def list_names(study: Study) -> str:

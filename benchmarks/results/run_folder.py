@@ -68,10 +68,6 @@ class RunFolder:
         """Return the path of metrics of each frame, beside the trajectory: name -> (T,) or (T,V)."""
         return self.trajectory_path(scene, method, seed).with_suffix(".npz")
 
-    def clips_path(self, clips: str, method: str, part: int) -> Path:
-        """Return the path of simulated mixed clips: name -> vertices (T,V,3) [m]."""
-        return self.trajectory_path(clips, f"{method}-{part}").with_suffix(".npz")
-
     def start_path(self, scene: str) -> Path:
         """Return the path of the settled start (V,3) [m] of a dressed scene."""
         return self.trajectory_path(scene, "settled").with_suffix(".npy")

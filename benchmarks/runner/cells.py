@@ -111,7 +111,6 @@ def compute_cell(cell: Cell, least: float, context: Context) -> Outcome:
     if status == "failed":
         return Outcome(status, reason, failed=True, result={"peak": peak})
     paths = [folder.trajectory_path(*cell.key)]
-    paths[0].parent.mkdir(parents=True, exist_ok=True)
     provenance = {"run_seconds": reading.seconds, "scene": scene.name, "seed": cell.seed}
     replace(trajectory, provenance=trajectory.provenance | provenance).save(paths[0])
     quasi_static = method.quasi_static() if cell.scene.dynamic or not cell.scene.dressed else None

@@ -29,7 +29,7 @@ from benchmarks.runner.task import Needed, Outcome, RunRefused, RunStopped, Task
 from benchmarks.timing import one_thread
 
 if TYPE_CHECKING:
-    from distributed import Client, Future
+    from distributed import Client
 
 FIRST = 5.0  # [s] in which a scheduler answers at first
 PATIENCE = 60.0  # [s] for a scheduler that was lost to be there again
@@ -68,8 +68,6 @@ class Cluster:
         self.address, self.folder = address, folder.path.resolve()
         self.assets = self.folder / f".assets-{uuid.uuid4().hex}.part"  # see RunFolder.remove_parts
         self.assets.write_bytes(pickle.dumps(assets))
-        self._futures: set[Future] = set()
-        self._stopped = False
         self.rest()
         if not self.client.nthreads():
             print(f"waiting for workers: dask worker {address} --nthreads 1", file=sys.stderr)
@@ -95,13 +93,12 @@ class Cluster:
     def _outcome(self, task: Task, needed: Needed, near: str) -> tuple[Outcome, str]:
         """Return the outcome of a task and the address of its worker. near: of the one that is preferred."""
         work = pickle.dumps((task, needed, software_of(task)))
-        while not self._stopped:
-            future = self.client.submit(
-                do_task, self.assets, work, key=f"{task.kind}-{uuid.uuid4().hex}", pure=False,
-                workers=[near] if near else None, allow_other_workers=bool(near),
-            )  # fmt: skip
-            self._futures.add(future)
+        while True:
             try:
+                future = self.client.submit(
+                    do_task, self.assets, work, key=f"{task.kind}-{uuid.uuid4().hex}", pure=False,
+                    workers=[near] if near else None, allow_other_workers=bool(near),
+                )  # fmt: skip
                 return future.result()
             except RunStopped:
                 raise
@@ -116,15 +113,11 @@ class Cluster:
                 return Outcome(
                     "failed", f"workers died while they did it: {one_line(error)}", failed=True
                 ), ""
-            finally:
-                self._futures.discard(future)
-        return Outcome("failed", "stopped", failed=True), near
 
     def stop(self) -> None:
-        """Cancel all tasks, from another thread."""
-        self._stopped = True
-        for future in list(self._futures):
-            future.cancel()
+        """End all processes and cancel all tasks, from another thread."""
+        self.rest()
+        self.client.close()
 
     def rest(self) -> None:
         """End the processes of the run's folder on all workers, those of a command that was killed too."""

@@ -53,7 +53,6 @@ def simulate_motion(scene: Scene, entry: MethodEntry, context: Context, needed: 
     built, run = scene.build(context.assets), context.folder
     trajectory = simulated(built, entry, run)
     path = run.trajectory_path(scene.name, entry.name)
-    path.parent.mkdir(parents=True, exist_ok=True)
     # Without what the clock showed: the same simulation has the same bytes wherever it is done.
     replace(trajectory, frame_seconds=trajectory.frame_seconds[:0]).save(path)
     result = {
@@ -95,8 +94,7 @@ def simulate_clips(
             left_out[clip.name] = reason
         else:
             kept[clip.name] = positions.astype(np.float32)  # as networks see it
-    path = run.clips_path(clips_of(scene.garment, motions), entry.name, part)
-    path.parent.mkdir(parents=True, exist_ok=True)
+    path = run.curves_path(clips_of(scene.garment, motions), f"{entry.name}-{part}")
     with replacing(path) as temporary:
         np.savez(temporary, **kept)
     return Outcome(result={"clips": list(kept), "left_out": left_out}, files=(run.relative(path),))
@@ -142,7 +140,6 @@ def simulate_quasi_static(scene: Scene, context: Context, needed: Needed) -> Out
 
     built = build_scene(scene, context)
     path = context.folder.quasi_static_path(scene.name)
-    path.parent.mkdir(parents=True, exist_ok=True)
     trajectory = simulate(
         built.cloth, built.simulated_energies, frames=built.frames, obstacle=built.obstacle,
         start=built.start, pin_positions=built.pin_positions, **STATIC,

@@ -113,7 +113,6 @@ def train(job: NetworkTraining, context: Context, needed: Needed) -> Outcome:
 def _outcome(model: TrainedModel, job: NetworkTraining, run: RunFolder, facts: dict[str, Any]) -> Outcome:
     """Write the model; the outcome says how it was trained, and names the machine that trained it."""
     path = job.path(run)
-    path.parent.mkdir(parents=True, exist_ok=True)
     model.save(path)
     result = {
         "recipe": model.recipe.name,
