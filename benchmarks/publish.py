@@ -131,10 +131,8 @@ def publish(name: str, out: Path, into: Path, head: str) -> None:
     if not all_usable(RunFolder(whole)):
         raise ResultsError(f"{whole}: has failed")
     if others := sorted({row.commit for row in RunFolder(whole).read_rows()} - {head, ""}):
-        commits = ", ".join(others)
-        raise ResultsError(
-            f"{whole}: rows of commit {commits}; remove the folder, or check that commit out"
-        )
+        found = f"{whole}: rows of commit {', '.join(others)}"
+        raise ResultsError(f"{found}; remove the folder, or check that commit out")
     for film, wanted in show.films.items():
         path = whole / "figures" / film
         path.unlink(missing_ok=True)

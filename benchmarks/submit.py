@@ -286,9 +286,8 @@ def find_copies(entry: Entry, samples: dict[str, Floats]) -> None:
             if same.mean() >= COPIED:
                 order = np.sign(np.diff(nearest[same]).mean())
                 way = {0.0: "one of them held", 1.0: "in order", -1.0: "in reverse"}[float(order)]
-                raise EntryError(
-                    f"{entry.path}: {name}: its frames are those of {' '.join(whose)}, {way}"
-                )
+                copied = f"its frames are those of {' '.join(whose)}, {way}"
+                raise EntryError(f"{entry.path}: {name}: {copied}")
 
 
 if __name__ == "__main__":

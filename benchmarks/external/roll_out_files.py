@@ -122,9 +122,7 @@ def read_roll_out(path: str | Path) -> StoredRollOut:
         )
     try:
         return _checked(_READERS.get(suffix, _meshes)(path))
-    except (
-        Exception
-    ) as error:  # a damaged file fails in nearly every way, none of them this program's own
+    except Exception as error:  # a damaged file fails in nearly every way
         why = " ".join(str(error).split())[:300] or type(error).__name__
         raise RollOutFileError(why if path in why else f"{path}: {why}") from None
 

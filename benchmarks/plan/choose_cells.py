@@ -64,12 +64,9 @@ def choose_cells(read: ReadStudy) -> tuple[tuple[Cell, ...], tuple[Case, ...]]:
     # The reference first: an error against it can be said as soon as another cell is done.
     places = {name: place for place, name in enumerate(read.scenes)}
     order = {name: place for place, name in enumerate((*read.methods, *study.rollouts))}
-    cells = _timed_once(
-        sorted(
-            (*chosen.values(), *stored),
-            key=lambda c: (places[c.scene.name], order.get(c.method, 0), c.seed),
-        )
-    )
+    found = (*chosen.values(), *stored)
+    found = sorted(found, key=lambda c: (places[c.scene.name], order.get(c.method, 0), c.seed))
+    cells = _timed_once(found)
     _check_user_scenes([cell.scene for cell in cells], read.motions)
     return tuple(cells), cases
 

@@ -160,9 +160,8 @@ def protocol_of(cell: Cell, plan: Plan) -> str:
     given = scene.dressed and (inputs.body or scene.motion in inputs.motions)
     if given or sizes != find_preset(sizes.name) or not _is_declared(scene, sizes.name):
         return OWN
-    if any(
-        c.entry.role == "reference" and c.entry.module == STORED for c in plan.cells if c.scene == scene
-    ):
+    entries = (c.entry for c in plan.cells if c.scene == scene)
+    if any(entry.role == "reference" and entry.module == STORED for entry in entries):
         return OWN
     network = network_of(cell)
     if network is None or network.users_training:
@@ -183,10 +182,8 @@ _declared_with = cache(all_scenes)  # motions and swinging motions
 def _is_declared(scene: Scene, preset: str) -> bool:
     """Return whether the project declares the scene so; a run may leave out what is measured in it."""
     motions = (scene.motion,) * bool(scene.motion)
-    declared = _declared_with(motions, motions).get(scene.name)
-    return (
-        declared is not None and replace(declared.at(find_preset(preset)), metrics=scene.metrics) == scene
-    )
+    known = _declared_with(motions, motions).get(scene.name)
+    return known is not None and replace(known.at(find_preset(preset)), metrics=scene.metrics) == scene
 
 
 # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers

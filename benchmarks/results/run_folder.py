@@ -145,9 +145,8 @@ def write_frame_energies(folder: RunFolder, rows: Iterable[Row]) -> None:
     )
     curves = {cell: _curves(folder.curves_path(*cell)) for cell in cells}
     curves = {cell: energies for cell, energies in curves.items() if SECONDS in energies}
-    terms = list(
-        dict.fromkeys(name for energies in curves.values() for name in energies if name != SECONDS)
-    )
+    names = (name for energies in curves.values() for name in energies if name != SECONDS)
+    terms = list(dict.fromkeys(names))
     if not terms:
         folder.frame_energies_path.unlink(missing_ok=True)
         return
@@ -188,6 +187,5 @@ def read_frame_energies(path: Path) -> pd.DataFrame:
         numbers = {name: [float(cell or "nan") for cell in table[name]] for name in columns[3:]}
         return table.assign(seed=list(map(int, table["seed"])), **numbers)
     except (OSError, ValueError) as error:
-        raise ResultsError(
-            f"{path}: not readable as CSV in UTF-8 ({' '.join(str(error).split())})"
-        ) from None
+        why = " ".join(str(error).split())
+        raise ResultsError(f"{path}: not readable as CSV in UTF-8 ({why})") from None

@@ -202,10 +202,8 @@ def judge(
     if trajectory.status == "max_iterations":
         return ("ok", "") if truncated else ("stalled", reason)
     if trajectory.status not in STATUSES:
-        return (
-            "failed",
-            f"unknown status '{trajectory.status}', use one of {', '.join(STATUSES)}; {reason}",
-        )
+        known = ", ".join(STATUSES)
+        return "failed", f"unknown status '{trajectory.status}', use one of {known}; {reason}"
     status = "ok" if trajectory.status == "converged" else trajectory.status
     if status != "ok" and not truncated and "converged" in trajectory.frame_fields:
         bad = int((trajectory.frame_fields["converged"] < 0.5).sum())

@@ -110,9 +110,8 @@ class Cluster:
                     continue
                 if type(error).__name__ != "KilledWorker":
                     raise RunStopped(f"{self.address}: {task.title}: {one_line(error)}") from None
-                return Outcome(
-                    "failed", f"workers died while they did it: {one_line(error)}", failed=True
-                ), ""
+                died = f"workers died while they did it: {one_line(error)}"
+                return Outcome("failed", died, failed=True), ""
 
     def stop(self) -> None:
         """End all processes and cancel all tasks, from another thread."""
@@ -137,11 +136,8 @@ def software_of(task: Task) -> dict[str, str]:
     method = task.inputs.get("method")
     files = method["files"] if isinstance(method, dict) else ()
     digests = {name: digest_of_file(Path(name)) for name in files if Path(name).is_file()}
-    return (
-        software("benchmarks/runner", *task.code)
-        | digests
-        | {"package Python": platform.python_version()}
-    )
+    of_python = {"package Python": platform.python_version()}
+    return software("benchmarks/runner", *task.code) | digests | of_python
 
 
 # --- in a worker ---
@@ -161,10 +157,8 @@ def do_task(assets: Path, work: bytes) -> tuple[Outcome, str]:
     worker = get_worker()
     key = worker.get_current_task()
     if not assets.is_file():
-        unseen = (
-            f"it does not see the run's folder {assets.parent}: by --out give one that all machines see"
-        )
-        raise RunStopped(f"worker {worker.address}: {unseen}")
+        unseen = f"worker {worker.address}: it does not see the run's folder {assets.parent}"
+        raise RunStopped(f"{unseen}: by --out give one that all machines see")
     task, needed, software = pickle.loads(work)
     if changed := sorted(name for name, _ in software.items() ^ software_of(task).items()):
         other = f"its software is another ({changed[0]}); install the same there as here"

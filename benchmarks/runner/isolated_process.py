@@ -142,10 +142,8 @@ def how_it_ended(code: int) -> tuple[str, str]:
     """
     if code == -signal.SIGKILL:
         return "the process was killed by SIGKILL: the system was out of memory", "out-of-memory"
-    return (
-        f"the process ended with {f'status {code}' if code >= 0 else signal.Signals(-code).name}",
-        "failed",
-    )
+    how = f"status {code}" if code >= 0 else signal.Signals(-code).name
+    return f"the process ended with {how}", "failed"
 
 
 def end_group(pid: int) -> None:

@@ -139,9 +139,7 @@ def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
     for name in sorted(names, key=lambda name: order.get(name, len(order))):
         with suppress(KeyError):  # of a case, which describes its rows itself
             fields = vars(find_metric(name, plan.metrics))
-            metrics[name] = {
-                field: fields[field] for field in fields if field not in ("name", "declared_in")
-            }
+            metrics[name] = {f: fields[f] for f in fields if f not in ("name", "declared_in")}
     scenes = {
         scene.name: {"description": scene.description, "role": plan.motions.role_of(scene.motion)}
         for scene in plan.scenes
