@@ -118,10 +118,9 @@ def _of_scene(
         outcomes[id] = Outcome() if reference else simulate_quasi_static(scene, context, {})
     context.memo["roll-outs"] = roll_outs_of(cells, plan.study.sizes.gap_samples, context, outcomes)
     for cell in cells:
-        if cell.method in known:
-            origin = dict(reference.origin) if reference else {}
+        if reference and cell.method in known:
             usual = Outcome(files=(cell.name,), result={"terms": "+".join(context.memo["scene"].terms)})
-            outcomes[cell.id()] = replace(outcomes.get(cell.id(), usual), origin=origin)
+            outcomes[cell.id()] = replace(outcomes.get(cell.id(), usual), origin=dict(reference.origin))
             measured[cell.id("metrics")] = Outcome(result=known[cell.method])
         elif outcomes[cell.id()].files:
             with _steps_beside(context.memo["roll-outs"][cell]):

@@ -164,9 +164,6 @@ def _triangles(name: str, array: np.ndarray, vertices: float) -> np.ndarray:
     return array.astype(np.int64)
 
 
-# --- one reader for each kind of file: name -> value -------------------------------------------------------
-
-
 def _arrays(path: str) -> dict[str, Any]:
     read = read_arrays if path.lower().endswith(".npz") else read_pickled_arrays
     return {KEYS[name]: array for name, array in read(path, KEYS).items()}
@@ -202,9 +199,6 @@ _READERS: dict[str, Callable[[str], dict[str, Any]]] = {
     ".vtkhdf": _trajectory, ".hdf": _trajectory, ".npz": _arrays, ".pkl": _arrays, ".pickle": _arrays,
     ".pc2": _point_cache, ".pc16": _point_cache,
 }  # fmt: skip
-
-
-# --- fit to a scene ---------------------------------------------------------------------------------------
 
 
 def fit_to_scene(

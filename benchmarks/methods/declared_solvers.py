@@ -106,14 +106,12 @@ SOLVERS = (
         "refrozen", ", planes searched twice",
         ", each step solved again with contact planes searched at its end", "refrozen", refreeze=1,
     ),
-    # All negative curvature is taken out at once: moving cloth needs that in nearly every first
-    # iteration.
+    # All negative curvature is taken out at once: nearly every first iteration of moving cloth has some.
     *_truncated(
         "newton", "Newton", "iteration", "Newton's method on the true Hessian, stopped after {} a step",
         (1, 2, 4, 8), method="newton", start_projected=True,
     ),
-    # Without memory L-BFGS is preconditioned gradient descent, in the manner of projective dynamics: one
-    # constant matrix, a line search.
+    # Without memory L-BFGS is gradient descent, as projective dynamics: a constant matrix, a line search.
     *_truncated(
         "lbfgs", "L-BFGS", "iteration", "L-BFGS, factored preconditioner, stopped after {}",
         (5, 10, 20, 40), method="lbfgs", finish=False, memory=10,

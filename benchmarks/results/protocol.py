@@ -13,8 +13,7 @@ from benchmarks.provenance import digest
 from benchmarks.results.row import ResultsError
 
 NUMBER = "2.0"
-# Part of the protocol -> digest of its definitions. tests/benchmarks/test_protocol.py holds the code to
-# them.
+# Part of the protocol -> digest of its definitions: tests/benchmarks/test_protocol.py compares them.
 DIGESTS = {
     "scenes": "88c6128b67b3dd78",
     "materials": "37f8eb4aecad748b",
@@ -56,8 +55,7 @@ def one_protocol(protocols: Iterable[str], where: object) -> str:
 
 # Time steps a frame -> the simulations with that step from two starts, the second moved by 1e-4 m. Both
 # are equally valid answers to one problem, so what they differ by is the noise of a number. Simulations
-# with other time steps solve other problems: what a number changes by from one to the other is a trend,
-# no noise.
+# with other time steps solve other problems: what a number changes by between them is a trend, no noise.
 STARTS = {1: ("simulation", "simulation-perturbed-1e-4")} | {
     steps: (f"simulation-dt/{steps}", f"simulation-dt/{steps}-perturbed-1e-4") for steps in (2, 4, 8)
 }

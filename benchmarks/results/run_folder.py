@@ -184,8 +184,7 @@ def read_frame_energies(path: Path) -> pd.DataFrame:
         columns = list(table)
         if tuple(columns[: len(CELL)]) != CELL or len(columns) == len(CELL):
             raise ValueError(f"the columns should be {','.join(CELL)} and energies")
-        numbers = {name: [float(cell or "nan") for cell in table[name]] for name in columns[3:]}
-        return table.assign(seed=list(map(int, table["seed"])), **numbers)
+        return table.replace("", "nan").astype({"seed": int, **dict.fromkeys(columns[3:], float)})
     except (OSError, ValueError) as error:
         why = " ".join(str(error).split())
         raise ResultsError(f"{path}: not readable as CSV in UTF-8 ({why})") from None

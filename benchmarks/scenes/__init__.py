@@ -29,8 +29,7 @@ SCENES = (
     _sheet("free_fall", "a thrown sheet with no pins and its weight alone; the exact answer is known"),
 )  # fmt: skip
 
-# Scenes besides the test motions leave costs out, so nothing in them is timed and several run side by
-# side.
+# Scenes besides the test motions leave costs out: nothing is timed there, and several run side by side.
 WALK = "walk"  # made by code, without a role; walks of recordings train: what breaks here breaks next to them
 ORDINARY = "out_of_distribution/ordinary"
 

@@ -165,8 +165,7 @@ def _simulated(
         obstacle=Obstacle(posed, body.faces, rest_positions=body.shaped()),
         pin_positions=handles.__getitem__ if len(garment.pins) else None,
     )  # fmt: skip
-    # A step that diverges ends a simulation: what it leaves is a garment half-way, on a body that moved
-    # on.
+    # A step that diverges ends a simulation: a garment is left half-way, on a body that moved on.
     if trajectory.frames < motion.frames:
         raise RuntimeError(
             f"the garment did not {aim} of {motion.name}: {trajectory.reason}; the pose may leave it no room"

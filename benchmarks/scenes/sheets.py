@@ -68,8 +68,7 @@ def build_hanging_sheet(
 ) -> BuiltScene:
     """Build the scene of a square sheet pinned at two corners and let go from the horizontal."""
     positions, faces = square_sheet(sheet_cells, SIZE)
-    # Tilted by half a degree: a flat sheet hanging flat is a saddle, from which symmetry alone would
-    # choose.
+    # Tilted by half a degree: a flat sheet hanging flat is a saddle, where symmetry alone would choose.
     positions[:, 1] += 0.01 * positions[:, 0]
     cloth = Cloth(positions, faces, Material(), pins=(0, sheet_cells))
     return _built(scene, cloth, sheet_frames, cloth.rest_positions)

@@ -103,8 +103,7 @@ def optimality_of(potential: sim.Potential, x: np.ndarray) -> OptimalityCheck:
     stiffest = float(np.abs(np.diagonal(hessian)).max())
     round_off = 8 * np.finfo(float).eps * stiffest * float(np.abs(x).max()) / weight
     width = float(np.sqrt(cloth.areas.sum()))
-    # Round-off of the eigenvalues, or a curvature that gains less than the tolerance over the sheet's
-    # width.
+    # Round-off of the eigenvalues, or a curvature that gains less than the tolerance over the width.
     zero = max(2e-13 * float(np.abs(values).max()), 2 * RELATIVE_RESIDUAL * weight / width)
     return OptimalityCheck(residual, min(round_off, ROUND_OFF), float(values[0]), zero)
 
