@@ -148,7 +148,7 @@ def _saved(reference: Reference, cell: Cell, context: Context) -> Outcome:
 
 @contextmanager
 def _steps_beside(roll_out: RollOut) -> Iterator[None]:
-    """Solve the time steps of a roll-out again in another process, while this one measures all else."""
+    """Solve a roll-out's time steps again in another process, while this one measures the rest."""
     if "speed" not in roll_out.suites or sys.platform != "linux":
         yield
         return

@@ -31,7 +31,7 @@ def model_path(models: Path, kind: str, seed: int) -> Path:
 
 
 class RunFolder:
-    """The files of one run under `path`, and folders of its report, networks, trajectories and outcomes.
+    """The files of one run under `path`, and the folders of others.
 
     Making the object creates nothing.
     """

@@ -126,8 +126,7 @@ class Cluster:
 
     def close(self) -> None:
         """End everything that was begun on the cluster."""
-        self.rest()
-        self.client.close()
+        self.stop()
         self.assets.unlink(missing_ok=True)
 
 
