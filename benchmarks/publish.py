@@ -122,8 +122,7 @@ def published_studies() -> list[str]:
 def publish(name: str, out: Path, into: Path, head: str) -> None:
     """Run the study of that name or path below `out`, or go on with it; keep below `into` what is published.
 
-    Raises ResultsError where the run failed, has rows of another commit than `head`, or lacks a picture
-    that the documents show.
+    Raises ResultsError where the run failed, has rows of another commit than `head`, or lacks a picture.
     """
     show, whole = read_study(name).show, out / Path(name).stem
     assert show is not None

@@ -31,7 +31,7 @@ def model_path(models: Path, kind: str, seed: int) -> Path:
 
 
 class RunFolder:
-    """The files of one run under `path`, and the folders of others.
+    """The files of one run, and folders of its networks, outcomes and report.
 
     Making the object creates nothing.
     """
