@@ -131,7 +131,7 @@ def _of_scene(
 
 
 def _saved(reference: Reference, cell: Cell, context: Context) -> Outcome:
-    """Write a reference into the folder of the run as if it had been simulated there."""
+    """Write a reference into the run's folder, as if simulated there."""
     built, folder = context.memo["scene"], context.folder
     still = np.full_like(reference.positions, np.nan)
     still[:, built.dressed.garment.hem] = reference.hem

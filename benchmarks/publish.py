@@ -82,7 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def make_reference(name: str, out: Path) -> Path:
     """Make the file of benchmarks.references of a scene; return its path.
 
-    A scene is simulated where it has none that fits; else only what is measured beside it is made anew.
+    A scene without one that fits is simulated; else its numbers alone are made anew.
     """
     from benchmarks import references
     from benchmarks.evaluate import assets_of, evaluate  # loads the simulator
@@ -122,7 +122,8 @@ def published_studies() -> list[str]:
 def publish(name: str, out: Path, into: Path, head: str) -> None:
     """Run the study of that name or path below `out`, or go on with it; keep below `into` what is published.
 
-    Raises ResultsError where the run failed, has rows of another commit than `head`, or lacks a picture.
+    Raises ResultsError where the run failed, has rows of another commit than `head`, or lacks a picture
+    that the documents show.
     """
     show, whole = read_study(name).show, out / Path(name).stem
     assert show is not None

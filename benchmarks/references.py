@@ -90,7 +90,7 @@ def write_garment(garment: Garment) -> None:
 
 
 def key_of(scene: Scene, plan: Plan, built: BuiltScene) -> str:
-    """Return the digest of all that makes the numbers of a scene what they are, but for code and motion."""
+    """Return the digest of what the numbers of a scene depend on, but for code and motion."""
     sizes, declaration = plan.study.sizes, declared(scene) | {"faces": digest(built.cloth.faces)}
     del declaration["metrics"]
     parts = [DIGESTS[name] for name in PARTS]

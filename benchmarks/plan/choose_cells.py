@@ -65,8 +65,8 @@ def choose_cells(read: ReadStudy) -> tuple[tuple[Cell, ...], tuple[Case, ...]]:
     places = {name: place for place, name in enumerate(read.scenes)}
     order = {name: place for place, name in enumerate((*read.methods, *study.rollouts))}
     found = (*chosen.values(), *stored)
-    found = sorted(found, key=lambda c: (places[c.scene.name], order.get(c.method, 0), c.seed))
-    cells = _timed_once(found)
+    ordered = sorted(found, key=lambda c: (places[c.scene.name], order.get(c.method, 0), c.seed))
+    cells = _timed_once(ordered)
     _check_user_scenes([cell.scene for cell in cells], read.motions)
     return tuple(cells), cases
 
