@@ -33,7 +33,7 @@ EXAMPLES = f"""examples:
   python -m snug.train                                   SNUG on the embedded motions, 1000 vertices
   python -m snug.train --garment shirt.obj,units=cm --body mine.npz    your own garment (see snug.check)
   python -m snug.train --model pbns --steps 8000         the static baseline
-  python -m snug.train --motions clips/ --hold-out 01_01 -o clips.safetensors
+  python -m snug.train --motions clips/ -o clips.safetensors
   python -m snug.train --recipe paper --vertices 4400    the paper's text (see snug.named_recipes on contact)
   python -m snug.train --dataset motions.h5 --model supervised    learn from simulated motions
   python -m snug.train --resume                          go on where a killed run wrote its last checkpoint
@@ -61,8 +61,6 @@ def parse_options(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     add("--motions", metavar="PATH",
         help="a motion file or a folder of them (default: the embedded library)")  # fmt: skip
     add("--dataset", metavar="FILE", help="a file of simulated motions")
-    add("--hold-out", metavar="NAME", action="append", default=[],
-        help="leave a motion out; may be repeated")  # fmt: skip
     add("--seed", type=int, default=0, help="of everything random (default: %(default)s)")
     add("--device", default="cpu", metavar="cpu|cuda", help="where the whole step runs (default: cpu)")
     add("--resume", action="store_true", help="go on from the last checkpoint, if there is one")
@@ -99,7 +97,7 @@ def choose_garment(options: argparse.Namespace, body: Body) -> Garment:
 
 
 def choose_motions(options: argparse.Namespace, simulated: Sequence[Motion] = ()) -> list[Motion]:
-    """Return the motions to train on. Raises ValueError for an unknown name.
+    """Return the motions to train on.
 
     The simulated motions of a data set take the place of the library's. Test clips of a published split
     are left out.
@@ -114,11 +112,7 @@ def choose_motions(options: argparse.Namespace, simulated: Sequence[Motion] = ()
         motions = [motion for motion in read if motion.name not in reading.clips("test")]
         if absent := reading.absent([motion.name for motion in read]):
             print(absent, file=sys.stderr)
-    names = [motion.name for motion in motions]
-    for name in options.hold_out:
-        if name not in names:
-            raise ValueError(f"--hold-out {name}: no such motion among {', '.join(names)}")
-    return [motion for motion in motions if motion.name not in options.hold_out]
+    return motions
 
 
 @command("snug.train", goes_on="--resume goes on from there")

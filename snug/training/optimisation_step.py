@@ -107,7 +107,10 @@ class Trainer:
             )
             if recipe.contact_samples == "nearest_vertices":
                 self.nearest = NearestVertices(self.data)
-            self.contact = self.contact_of(self.data)
+            elif "collision" in recipe.terms:
+                self.contact = TrainingContact(
+                    self.data, self.loss.contact, kept=not self.shaped, kernels=self.kernels
+                )
         if not how.physics:
             self.targets = TARGETS[how.targets](self.data, motions, trajectories, self.weights)
         if self.contact:
@@ -123,12 +126,6 @@ class Trainer:
         self.guard = DivergenceGuard(
             self.network, self.optimiser, spike=recipe.spike if how.physics else None
         )
-
-    def contact_of(self, data: TrainingSet) -> TrainingContact | None:
-        """Return contact anchors for the frames of a set; None without collision, or where none are kept."""
-        if self.loss is None or self.nearest or "collision" not in self.recipe.terms:
-            return None
-        return TrainingContact(data, self.loss.contact, kept=not self.shaped, kernels=self.kernels)
 
     def draw(self) -> np.ndarray:
         """Draw the next windows: every sub-sequence once, in random order, before any comes again."""

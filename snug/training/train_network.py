@@ -90,9 +90,6 @@ class TrainingLoop:
         self.recent = []
         return row
 
-    def _identity(self) -> dict[str, Any]:
-        return describe_run(self.trainer, every=self.every)
-
     def _save(self, checkpoint: Checkpoint) -> None:
         tensors, facts = self.trainer.state()
         state = {
@@ -102,11 +99,14 @@ class TrainingLoop:
             "recent": self.recent,
             "trainer": facts,
         }
-        checkpoint.write(self._identity(), tensors, state)
+        checkpoint.write(describe_run(self.trainer, every=self.every), tensors, state)
         self._saved = time.perf_counter()
 
     def _resume(self) -> None:
-        if self.checkpoint is None or (stored := self.checkpoint.read(self._identity())) is None:
+        if self.checkpoint is None:
+            return
+        stored = self.checkpoint.read(describe_run(self.trainer, every=self.every))
+        if stored is None:
             return
         tensors, state = stored
         self.trainer.resume(tensors, state["trainer"])

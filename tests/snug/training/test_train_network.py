@@ -107,7 +107,6 @@ def test_test_clips_of_a_published_split_do_not_train(tmp_path, capsys):
         ("-o {0}/file/model.safetensors", "file"),
         ("--seed -1", "seed=-1: give a number from 0"),
         ("--motions {0}/nowhere", "nowhere"),
-        ("--hold-out dance_turn", "no such motion among 07_01"),
     ],
 )
 def test_command_line_refuses_what_it_could_not_do(arguments, hint, refused, tmp_path):
