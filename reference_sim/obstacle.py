@@ -246,8 +246,10 @@ class Obstacle:
 
         return carried
 
-    def beside(self, points: np.ndarray) -> bool:
-        """Return whether most of the points (N, 3) [m] are within BESIDE of the surface in frame 0."""
+    def moves_beside(self, points: np.ndarray) -> bool:
+        """Return whether it moves, and most points (N, 3) [m] are within BESIDE of it in frame 0."""
+        if self.frames == 1 or len(points) == 0:
+            return False
         gaps = np.linalg.norm(points - self._nearest(points, 0).points, axis=1)
         return bool(np.median(gaps) <= BESIDE)
 

@@ -83,7 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         frames = obstacle.frames if obstacle is not None and obstacle.frames > 1 else FRAMES_ALONE
     rides = None
     pins = cloth.rest_positions[cloth.pins]
-    if len(pins) and obstacle is not None and obstacle.frames > 1 and obstacle.beside(pins):
+    if obstacle is not None and obstacle.moves_beside(pins):
         rides = obstacle.carrying(pins)
     motion = simulate(
         cloth, terms, dt=options.dt, frames=frames, obstacle=obstacle, pin_positions=rides,

@@ -171,8 +171,7 @@ class TimeStepper:
         rest = self.cloth.rest_positions
         x = _finite(rest if start is None else start, rest.shape, "start")
         pins = x[self.cloth.pins]
-        body = self.obstacle
-        if pin_positions is None and len(pins) and body and body.beside(pins) and body.frames > 1:
+        if pin_positions is None and self.obstacle and self.obstacle.moves_beside(pins):
             raise ValueError(
                 f"simulate: the obstacle beside {len(pins)} pins moves: give pin_positions, as "
                 "obstacle.carrying(pins) that lets them ride on it, or lambda frame: pins"

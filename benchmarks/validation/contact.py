@@ -97,7 +97,7 @@ class RoundBody:
         c, s = np.cos(frame * self.turn), np.sin(frame * self.turn)
         return np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]])
 
-    def beside(self, points: np.ndarray) -> bool:
+    def moves_beside(self, points: np.ndarray) -> bool:
         """Return that no pins ride on it: ends of a strip are held while the drum turns below."""
         return False
 
