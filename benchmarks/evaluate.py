@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import shutil
 import sys
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
@@ -155,19 +155,21 @@ def _steps_beside(roll_out: RollOut) -> Iterator[None]:
     fork: Any = get_context("fork")  # what the process needs is there, and nothing is loaded again
     _remembered[:] = [roll_out]
     with ProcessPoolExecutor(1, fork) as pool:
-        roll_out.group.keep(gap_scale, pool.submit(_of_remembered, gap_scale))
-        roll_out.keep(judge_steps, pool.submit(_of_remembered, judge_steps))
+        roll_out.group.keep(gap_scale, pool.submit(_remembered_scale))
+        roll_out.keep(judge_steps, pool.submit(_remembered_steps))
         yield
 
 
 _remembered: list[RollOut] = []
 
 
-def _of_remembered(make: Callable[[Any], Any]) -> Any:
+def _remembered_steps() -> Any:
+    return _remembered[0].kept(judge_steps)
+
+
+def _remembered_scale() -> Any:
     roll_out = _remembered[0]
-    if make is not gap_scale:
-        return roll_out.kept(make)
     # Where no kernel is compiled yet, the other process compiles the search for contact planes meanwhile.
     if smooth := [term for term in roll_out.scene.energies if term.name in SMOOTH]:
         Potential(smooth).hessian(roll_out.positions[0])
-    return roll_out.group.kept(make)
+    return roll_out.group.kept(gap_scale)

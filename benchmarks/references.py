@@ -47,7 +47,7 @@ SAME = 1e-4  # [rad], [m] by which one motion may differ from another processor'
 
 @dataclass(frozen=True, eq=False)
 class Reference:
-    """What is shipped of a scene.
+    """A simulation that is shipped in place of one of a scene, and what was measured beside it.
 
     Attributes:
         positions: (T,V,3) [m] of the simulation, its start included.

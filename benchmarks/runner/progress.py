@@ -27,7 +27,7 @@ def expected_of(task: Task) -> float:
 
 
 class Progress:
-    """What of these tasks is left, and how long it may take where so many `workers` are at work.
+    """The tasks that are left, and how long they may take where so many `workers` are at work.
 
     Seconds of tasks that have ended correct what is expected of others of their kind. Use it in a `with`:
     on a terminal a line is drawn anew each second, a file gets one each half minute.

@@ -141,8 +141,8 @@ def settled(cloth: Cloth, energies: tuple[Energy, ...], dressed: Dressed, frames
     way = replace(dressed, motion=replace(motion, poses=poses, translations=translations))
     x = _simulated(cloth, energies, way, start, "come to rest in the first pose")[-1]
     whole = replace(garment, pins=np.arange(len(x)))
-    worn = whole.pin_positions(body, first[None], translations[:1], betas)[0]
-    off = np.linalg.norm(x - worn, axis=1)
+    carried = whole.pin_positions(body, first[None], translations[:1], betas)[0]
+    off = np.linalg.norm(x - carried, axis=1)
     pieces = piece_of_faces(cloth.faces)
     gap = max(off[cloth.faces[pieces == piece]].min() for piece in range(pieces.max() + 1))
     if gap > FALLEN:

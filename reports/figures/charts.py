@@ -21,7 +21,7 @@ from reports.figures.plotting import (
     power_text,
     style,
 )
-from reports.finished_run import ReportedMethod, Run, shown_seeds
+from reports.finished_run import Run, shown_seeds
 from reports.statistics.means_and_spreads import value_of
 from reports.statistics.outcomes import leads
 from reports.statistics.pareto import (
@@ -69,7 +69,8 @@ def curves_of(run: Run, points: Iterable[Point]) -> list[Curve]:
     groups: dict[tuple[bool, str], list[Point]] = {}
     for point in shown:
         method = run.methods[point.method]
-        key = (True, method.base) if _is_solver(method) else (False, method.family)
+        solver = method.level is not None and method.role in ("solver", STARTED)
+        key = (True, method.base) if solver else (False, method.family)
         groups.setdefault(key, []).append(point)
     ordered = sorted(groups.items(), key=lambda group: group[0][0])
     return [_solvers(run, members) if early else _family(run, members) for (early, _), members in ordered]
@@ -95,10 +96,6 @@ def _family(run: Run, members: list[Point]) -> Curve:
     )
     look = family_style(run, method)
     return Curve(members, replace(look, label=f"{look.label}, {' to '.join(levels)}"))
-
-
-def _is_solver(method: ReportedMethod) -> bool:
-    return method.level is not None and method.role in ("solver", STARTED)
 
 
 DECADES = 9  # below the largest error; what is smaller is named, not drawn

@@ -96,6 +96,20 @@ class Trainer:
         self.windows = recipe.batch if how.network.sequential else recipe.batch * recipe.window
         self.order = np.empty(0, np.int64)
         self.epoch = 0
+        self._set_losses(motions, trajectories)
+        self.hidden_states: HiddenStateCache | None = None
+        start = self.network.random_state(1, 0.0, torch.Generator())
+        # A state belongs to one body.
+        if how.physics and recipe.remembered and not self.shaped and start is not None:
+            states = start.shape[0], start.shape[-1]
+            self.hidden_states = HiddenStateCache(self.data.first, states, device)
+        self.guard = DivergenceGuard(
+            self.network, self.optimiser, spike=recipe.spike if how.physics else None
+        )
+
+    def _set_losses(self, motions: Sequence[Motion], trajectories: Trajectories | None) -> None:
+        """Set energies with their contact, distances from simulated vertices, and what they weigh."""
+        how, recipe = self.how, self.recipe
         self.loss: PhysicsLoss | None = None
         self.contact: TrainingContact | None = None
         self.nearest: NearestVertices | None = None  # in place of anchors
@@ -103,7 +117,7 @@ class Trainer:
         how.check(recipe)
         if how.physics or recipe.physics_weight:
             self.loss = PhysicsLoss(
-                dressed.cloth, recipe, dt=self.data.dt, device=device, kernels=self.kernels
+                self.dressed.cloth, recipe, dt=self.data.dt, device=self.device, kernels=self.kernels
             )
             if recipe.contact_samples == "nearest_vertices":
                 self.nearest = NearestVertices(self.data)
@@ -117,15 +131,6 @@ class Trainer:
             self.contact.search_first(self.weights)
         # Of energies beside simulated vertices in the loss; all other terms have 1.
         self.factors = dict.fromkeys(recipe.terms, recipe.physics_weight) if self.targets else {}
-        self.hidden_states: HiddenStateCache | None = None
-        start = self.network.random_state(1, 0.0, torch.Generator())
-        # A state belongs to one body.
-        if how.physics and recipe.remembered and not self.shaped and start is not None:
-            states = start.shape[0], start.shape[-1]
-            self.hidden_states = HiddenStateCache(self.data.first, states, device)
-        self.guard = DivergenceGuard(
-            self.network, self.optimiser, spike=recipe.spike if how.physics else None
-        )
 
     def draw(self) -> np.ndarray:
         """Draw the next windows: every sub-sequence once, in random order, before any comes again."""

@@ -87,7 +87,9 @@ class TrainingSet:
         self.transforms = torch.cat([dressed.transforms(m.poses, betas) for m, betas in worn]).to(device)
         pelvises = [dressed.pelvis(motion) for motion in motions]
         self.ahead = torch.cat([_ahead(pelvis) for pelvis in pelvises]).to(device)
-        self.behind = torch.cat([_behind(pelvis) for pelvis in pelvises]).to(device)
+        # p_{t-1} - p_t of each frame, (F, 3) [m]; zero in a motion's first.
+        behind = np.concatenate([-np.diff(pelvis, axis=0, prepend=pelvis[:1]) for pelvis in pelvises])
+        self.behind = torch.as_tensor(behind, dtype=torch.float32).to(device)
         self.rest = dressed.rest().to(device)
         self._rest_directions: Tensor | None = None
         body = dressed.body
@@ -211,11 +213,6 @@ def _ahead(pelvis: np.ndarray) -> Tensor:
     ahead = np.zeros_like(pelvis)
     ahead[2:] = 2 * pelvis[1:-1] - pelvis[:-2] - pelvis[2:]
     return torch.as_tensor(ahead, dtype=torch.float32)
-
-
-def _behind(pelvis: np.ndarray) -> Tensor:
-    """Return p_{t-1} - p_t of each frame, (T, 3) [m]; zero in the first."""
-    return torch.as_tensor(-np.diff(pelvis, axis=0, prepend=pelvis[:1]), dtype=torch.float32)
 
 
 class HiddenStateCache:
