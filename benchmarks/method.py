@@ -45,7 +45,6 @@ class Training:
         kind: one of snug.kinds.KINDS.
         recipe: options of network and training.
         simulated: simulations that it learns from; None if it learns from the energies alone.
-        steps_of: name of the training whose number of steps it takes; empty for its own number.
         packaged: name of the network that is taken from the package in place of this training; empty: it
             is trained.
     """
@@ -53,7 +52,6 @@ class Training:
     kind: str
     recipe: Recipe
     simulated: Simulated | None = None
-    steps_of: str = ""
     packaged: str = field(default="", metadata={"added": True})
 
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import gzip
 import hashlib
 import importlib.util
 import json
@@ -29,17 +30,28 @@ PACKAGES = (  # those that compute, or read what is computed with
 )  # fmt: skip
 
 
+# What numbers are computed by; networks, references and studies name themselves by digest or in run.json.
+CODE = ("reference_sim", "snug", "benchmarks", ":!benchmarks/studies", ":!benchmarks/reference_data",
+        ":!*.safetensors", ":!*.md")  # fmt: skip
+
+
 @cache  # that of the first call, which is nearer to the code that was loaded than a later one
 def commit() -> str:
-    """Return the commit of the checkout, "+changes" where tracked files differ; else the package version."""
-    # No lock on the index: one would stay there where the disk is full. A tag is no commit.
-    command = ["git", "--no-optional-locks", "-C", str(ROOT), "describe", "--always", "--abbrev=10"]
-    command += ["--exclude=*", "--dirty=+changes"]
+    """Return the last commit that changed CODE, "+changes" where its files differ; else the package version.
+
+    So all runs between two changes of the code name one commit, whatever is committed besides.
+    """
+
+    def git(*words: str) -> str:
+        # No lock on the index: one would stay there where the disk is full.
+        command = ["git", "--no-optional-locks", "-C", str(ROOT), *words, "--", *CODE]
+        return subprocess.run(command, capture_output=True, text=True, timeout=20, check=True).stdout
+
     # No git here: the installed version is what is known.
     with suppress(OSError, subprocess.SubprocessError):
         if (ROOT / ".git").exists():
-            done = subprocess.run(command, capture_output=True, text=True, timeout=20, check=True)
-            return done.stdout.strip()
+            changes = git("status", "--porcelain", "--untracked-files=no")
+            return git("log", "-1", "--format=%h", "--abbrev=10").strip() + "+changes" * bool(changes)
     return f"version {package_version('neural-garment-benchmark')}"
 
 
@@ -132,8 +144,8 @@ def _plain(value: Any) -> Any:
 
 
 def digest_of_file(path: Path) -> str:
-    """Return 16 hexadecimal digits of a file's bytes. Raises OSError."""
-    with path.open("rb") as stream:
+    """Return 16 hexadecimal digits of a file's bytes, of a .gz file of what it holds. Raises OSError."""
+    with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()[:16]
 
 

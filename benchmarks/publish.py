@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import shlex
 import shutil
 import subprocess
@@ -12,11 +13,11 @@ from pathlib import Path
 
 from benchmarks.plan.cell import flat
 from benchmarks.plan.plan import make_plan
-from benchmarks.plan.study import Show, StudyError, read_study, study_names
+from benchmarks.plan.study import Show, Study, StudyError, read_study, study_names
 from benchmarks.provenance import commit, digest_of_file
 from benchmarks.results.row import USABLE, ResultsError
 from benchmarks.results.run_folder import RunFolder, model_path
-from benchmarks.runner.execute_plan import accepted
+from benchmarks.runner.execute_plan import accepted, describe
 from benchmarks.timing import one_thread
 from reference_sim.command_line import Parser, command
 from reference_sim.files.atomic_files import new_folder
@@ -26,16 +27,18 @@ PROGRAM = "benchmarks.publish"
 WORK = Path("reports/runs/published")
 TARGET = Path("reports/published")
 REFERENCES = "references"  # in place of a study
-KEPT = ("results.csv", "run.json", "report.pdf", "tables")
+KEPT = ("run.json", "report.pdf")
+PACKED = ("results.csv", "frame_energies.csv")  # kept as .csv.gz, which pandas reads as they are
 EXAMPLES = """examples:
   python -m benchmarks.publish shapes                one of them
   python -m benchmarks.publish                       all of them
   python -m benchmarks.publish references            what benchmarks.score takes in place of a simulation
 
-Each run goes on where it was stopped, in a folder of its own below --out: what is not timed may be run there
-  before, by benchmarks.run with more workers or on a cluster. When it has ended well, its rows, tables, PDF,
-  pictures and films that the documents show replace those in reports/published. Times want a machine with
-  nothing beside.
+A study that is published by the present code is left: in several sittings the same command does one after
+  another, each to be committed as it comes. Each run goes on where it was stopped, in a folder of its own
+  below --out: what is not timed may be run there before, by benchmarks.run with more workers or on a cluster.
+  When it has ended well, its rows, tables, PDF, pictures and films that the documents show replace those in
+  reports/published. Times want a machine with nothing beside.
 Then: python -m reports.docs writes the tables of README and docs from them.
 exit status: 0 all are published; 1 a run failed and is left as it was; 2 the request cannot be met: one line
   says why."""
@@ -43,7 +46,10 @@ exit status: 0 all are published; 1 a run failed and is left as it was; 2 the re
 
 @command(PROGRAM, goes_on="the same command goes on from there")
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; return its exit status."""
+    """Run the command; return its exit status.
+
+    Says first what is published of the code as it is, and how long each other study may take.
+    """
     one_thread()
     parser = Parser(
         prog=f"python -m {PROGRAM}",
@@ -70,7 +76,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         raise StudyError(f"study {silent[0]}: has no [show]: the studies {', '.join(known)} do")
     if head.endswith("+changes"):
         raise StudyError(f"{head}: commit the changes first, so that a commit says what was run")
-    for name in names:  # where one is not published, the next is done all the same
+    plans = {name: make_plan(read_study(name), folder=options.out / Path(name).stem) for name in names}
+    due = [name for name in names if not is_published(TARGET / Path(name).stem, plans[name].study, head)]
+    for name in names:
+        state = describe(plans[name]).rpartition("\n")[2] if name in due else "is published"
+        print(f"{name}: {state}", file=sys.stderr, flush=True)
+    for name in due:  # where one is not published, the next is done all the same
         try:
             publish(name, options.out, TARGET, head)
         except ValueError as error:  # of the run's command, of files of results
@@ -117,6 +128,14 @@ def make_reference(name: str, out: Path) -> Path:
 def published_studies() -> list[str]:
     """Return the names of the studies that have a table [show]."""
     return [name for name in study_names() if read_study(name).show is not None]
+
+
+def is_published(target: Path, study: Study, head: str) -> bool:
+    """Return whether a folder has what is published of a study as it is, computed by commit `head`."""
+    if not (target / "run.json").is_file():
+        return False
+    config = RunFolder(target).read_config()
+    return config.get("commit") == head and config.get("study") == study.written
 
 
 def publish(name: str, out: Path, into: Path, head: str) -> None:
@@ -166,14 +185,20 @@ def keep(whole: Path, target: Path, show: Show) -> None:
     """
     networks = [model_path(RunFolder(whole).models, name, seed=0) for name in show.networks]
     kept = [whole / name for name in KEPT] + [whole / "figures" / name for name in show.files]
-    kept += [path for path in [whole / "frame_energies.csv"] if path.exists()]
-    if missing := [path for path in (*kept, *networks) if not path.exists()]:
+    tables = [path for path in (whole / "tables").glob("*.csv") if not path.match("*_by_scene.csv")]
+    packed = [path for name in PACKED if (path := whole / name).exists() or name == PACKED[0]]
+    if missing := [path for path in (*kept, *packed, *networks) if not path.exists()]:
         raise ResultsError(f"{missing[0]}: not there, and the study publishes it")
     fresh = target.with_name(f"{target.name}.new")
     shutil.rmtree(fresh, ignore_errors=True)
     with new_folder(fresh) as part:
         for path in kept:
-            shutil.copytree(path, part / path.name) if path.is_dir() else shutil.copy(path, part)
+            shutil.copy(path, part)
+        for path in packed:  # of one time, so that equal files have equal copies
+            (part / f"{path.name}.gz").write_bytes(gzip.compress(path.read_bytes(), mtime=0))
+        (part / "tables").mkdir()
+        for path in tables:
+            shutil.copy(path, part / "tables")
         for path in networks:
             save_half(path, part / path.relative_to(whole))
     shutil.rmtree(target, ignore_errors=True)

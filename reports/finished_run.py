@@ -283,6 +283,6 @@ def read_run(folder: RunFolder) -> Run:
     return replace(
         run,
         protocol=one_protocol(run.frame["protocol"], folder.rows_path),
-        frame_energies=run_folder.read_frame_energies(folder.frame_energies_path),
+        frame_energies=run_folder.read_frame_energies(run_folder.packed(folder.frame_energies_path)),
         roll_outs=RollOuts(folder, run.problems),
     )

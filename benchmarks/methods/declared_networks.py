@@ -148,40 +148,6 @@ RECIPES = tuple(
 )  # fmt: skip
 
 
-def _equal_data(name: str, label: str, trained: str, mixed: int) -> MethodEntry:
-    """Declare a network trained as `trained`, on equal data: `mixed` augmented frames for each given one.
-
-    With every seed a network that simulated vertices teach gets the same clips, simulated once; another
-    mixes as many anew. Both have SNUG's number of steps. Not timed: its run time is that of the network
-    of the usual data.
-    """
-    usual = TRAININGS[trained]
-    recipe = replace(usual.recipe, name=f"{usual.recipe.name}-data-{mixed}")
-    training = (
-        replace(usual, recipe=recipe, simulated=Simulated(mixed=mixed))
-        if usual.simulated
-        else replace(usual, recipe=replace(recipe, mixed=float(mixed)))
-    )
-    return network(
-        f"{name}-data-{mixed}", f"{label}, {mixed} augmented for each",
-        f"{name} that learns from original data and {mixed} augmented frames for each",
-        training=replace(training, steps_of="snug"),
-        role="ablation", batched=False, timed=False,
-        reporting=Reporting(
-            family=f"{name}-data", level=float(mixed), base=trained, pairing_group=name,
-        ),
-    )  # fmt: skip
-
-
-EQUAL_DATA = tuple(
-    _equal_data(*named, mixed)
-    for named in (
-        ("snug", "SNUG", "snug"),
-        ("supervised", "Supervised by vertices", "supervised-vertices"),
-    )
-    for mixed in (0, 1, 3, 12)
-)
-
 PACKAGED = tuple(
     network(
         f"{entry.name}-packaged", f"{entry.label}, package",
@@ -192,4 +158,4 @@ PACKAGED = tuple(
     if f"{entry.name}-packaged" in TRAININGS
 )  # fmt: skip
 
-NETWORKS = (*NAMED, *PACKAGED, *RECIPES, *POST_PROCESSED, *EQUAL_DATA)
+NETWORKS = (*NAMED, *PACKAGED, *RECIPES, *POST_PROCESSED)

@@ -49,7 +49,8 @@ def choose_cells(read: ReadStudy) -> tuple[tuple[Cell, ...], tuple[Case, ...]]:
         methods = matching(read.methods, study.methods or study.parts[name].methods)
         pairs = ((read.scenes[scene], read.methods[method]) for scene in scenes for method in methods)
         for scene, entry in (pair for pair in pairs if pair[1].meant_for(pair[0])):
-            for seed in study.seeds if entry.seeded else (0,):
+            alone = bool(matching([entry.name], study.one_seed))
+            for seed in study.seeds[: 1 if alone else None] if entry.seeded else (0,):
                 key = (scene.name, entry.name, seed)
                 before = chosen[key].suites if key in chosen else ()
                 chosen[key] = Cell(scene.at(study.sizes), entry, seed, (*before, name))
@@ -182,6 +183,7 @@ def _check_words(read: ReadStudy) -> None:
 
     check("scenes", [*read.scenes, *cases], study.scenes)
     check("methods", methods, study.methods)
+    check("one_seed", methods, study.one_seed)
     # Scenes that tailor a T-shirt themselves are none of a run with another garment.
     scenes = list({**read.scenes, **all_scenes((), ())})
     for name, part in study.parts.items():

@@ -86,6 +86,7 @@ class Study:
         methods: these in every part, in place of its own: names, patterns, files (mine.py) of methods.
         metrics: files of your own metrics, measured besides all others.
         seeds: seeds of training.
+        one_seed: patterns of methods that are trained with the first of the seeds alone.
         motions: motion files (.npz, .bvh, .amc with .asf), folders, or the word library (default).
         motion_files: what motion files do not state: up, fps; split: snug or hood, that paper's clips alone.
         test_motions: names of the motions that test; by default those of the library.
@@ -110,6 +111,7 @@ class Study:
     methods: tuple[str, ...] = ()
     metrics: tuple[str, ...] = ()
     seeds: tuple[int, ...] = (0,)
+    one_seed: tuple[str, ...] = ()
     motions: tuple[str, ...] = ()
     motion_files: MotionFileOptions = field(default_factory=MotionFileOptions)
     test_motions: tuple[str, ...] = ()

@@ -57,7 +57,8 @@ class Row:
         expected, tolerance: of a validation case.
         uncertainty: noise of the value, of what the start of the reference changes, or its standard error
             as a sample of frames, in the unit of the value.
-        moved: change of the value by each member of the reference's family in its place, as JSON.
+        moved: change of the value by each member of the reference's family in its place, to four digits;
+            as JSON.
         preset, commit, hardware, dtype, threads: origin.
         protocol: number of the protocol; `own` where scene, metric or settings are a user's.
         terms: energies of the scene, joined by `+`.
@@ -104,7 +105,8 @@ class Row:
     pairing_group: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "moved", tuple(map(tuple, self.moved)))  # JSON gives lists
+        moved = ((name, float(f"{change:.4g}")) for name, change in self.moved)  # JSON gives lists
+        object.__setattr__(self, "moved", tuple(moved))
         if self.status not in STATUSES:
             raise self._error(f"status '{self.status}' is none of {', '.join(STATUSES)}")
         if self.status == "skipped" and (self.value is not None or not self.reason):

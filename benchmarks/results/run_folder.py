@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import gzip
 import json
 import math
 import os
@@ -28,6 +29,12 @@ OF_SCENES = ("preset", "preset_values", "body", "garment")
 def model_path(models: Path, kind: str, seed: int) -> Path:
     """Return the path of the model of that kind and seed."""
     return models / f"{kind}-seed{seed}.safetensors"
+
+
+def packed(path: Path) -> Path:
+    """Return the path of a file, or of its compressed copy, which a published run has in its place."""
+    copy = path.with_name(f"{path.name}.gz")
+    return copy if copy.is_file() and not path.is_file() else path
 
 
 class RunFolder:
@@ -92,7 +99,7 @@ class RunFolder:
 
     def changed(self, digests: Mapping[str, str]) -> dict[str, str]:
         """Return those of these files that are not as the run wrote them: name -> gone or damaged."""
-        paths = {name: self.path / name for name in digests}
+        paths = {name: packed(self.path / name) for name in digests}
         gone = {name: "gone" for name, path in paths.items() if not path.is_file()}
         present = {name: digest_of_file(path) for name, path in paths.items() if name not in gone}
         return gone | {name: "damaged" for name, now in present.items() if now != digests[name]}
@@ -110,7 +117,10 @@ class RunFolder:
     def read_rows(self) -> list[Row]:
         """All rows. Raises ResultsError naming file and line when the file is absent or broken."""
         try:
-            with regular(self.rows_path).open(newline="", encoding="utf-8") as stream:
+            path = regular(packed(self.rows_path))
+            with (gzip.open if path.suffix == ".gz" else open)(
+                path, "rt", newline="", encoding="utf-8"
+            ) as stream:
                 reader = csv.reader(stream)
                 if next(reader, ()) != list(COLUMNS):
                     raise ResultsError(f"the columns should be {','.join(COLUMNS)}")
@@ -118,7 +128,8 @@ class RunFolder:
                 return [cells_to_row(dict(zip(COLUMNS, cells, strict=True))) for cells in lines]
         except FileNotFoundError:
             raise ResultsError(f"{self.rows_path}: no such file; is this the folder of a run?") from None
-        except (ValueError, csv.Error) as error:  # not UTF-8, a cell of 131 kB, another number of cells
+        except (ValueError, csv.Error, EOFError, gzip.BadGzipFile) as error:
+            # Not UTF-8, a cell of 131 kB, another number of cells, a damaged copy.
             raise ResultsError(f"{self.rows_path}: line {reader.line_num}: {error}") from None
 
 

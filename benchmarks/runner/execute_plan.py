@@ -20,10 +20,11 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.executor import Executor
 from benchmarks.runner.loop import Runner
+from benchmarks.runner.progress import Progress
 from benchmarks.runner.rows import rows_of
 from benchmarks.runner.run_json import RunLog
 from benchmarks.runner.schedule import tasks_of
-from benchmarks.runner.task import RunRefused, one_line
+from benchmarks.runner.task import RunRefused, Task, one_line
 
 if TYPE_CHECKING:
     from benchmarks.assets import Assets
@@ -177,6 +178,7 @@ def describe(plan: Plan) -> str:
     """Return the plan in a few lines, and one line for each task. Starts nothing, writes nothing."""
     folder = RunFolder(plan.folder / "none" if plan.fresh else plan.folder)
     study, skipped, stage = plan.study, sum(not runs(cell) for cell in plan.cells), ""
+    due: list[Task] = []
     lines = [
         f"preset {study.sizes.name}: {study.sizes.description}",
         f"folder {plan.folder}",
@@ -193,4 +195,6 @@ def describe(plan: Plan) -> str:
         state = "run" if outcome is None else "cached" if outcome.content else "skip"
         lines.append(f"  {task.title}: {state}" + f" ({why})" * bool(why))
         counts[state] += 1
-    return "\n".join([*lines, f"{counts['run']} tasks to run; {counts['cached']} cached"])
+        due += [task] * (state == "run")
+    time_left = Progress(due, plan.workers).time_left()
+    return "\n".join([*lines, f"{counts['run']} tasks to run, {time_left}; {counts['cached']} cached"])

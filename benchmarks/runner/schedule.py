@@ -189,8 +189,7 @@ class Schedule:
     def training(self, network: Network) -> NetworkTraining:
         """Return how a network is trained."""
         motions, chosen = self.plan.motions.train, network.training
-        kind, steps_of = (chosen.kind, chosen.steps_of) if chosen else (network.name, "")
-        steps = self.preset.steps_of(steps_of or network.name, kind)
+        steps = self.preset.steps_of(network.name, chosen.kind if chosen else network.name)
         inputs = self._machine(self.plan.study.device) | self._of_body(network.garment)
         if network.packaged:  # of the package's training clips, which are whole
             inputs["assets"]["train_frames"] = find_preset("quick").train_frames

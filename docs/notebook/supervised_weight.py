@@ -54,7 +54,8 @@ def main() -> int:
 
     folder, *further = sys.argv[1:]
     status = run([
-        "equal_data", "--scenes", SCENES, "--methods", f"simulation,skinning,{__file__}", "--seeds", "0",
+        "full:garments", "--set", "split=validation", "--scenes", SCENES,
+        "--methods", f"simulation,skinning,{__file__}", "--seeds", "0",
         "--set", "sizes.steps.supervised=1500", "--workers", "1", "-o", folder, *further,
     ])  # fmt: skip
     values: dict[tuple[str, str, int], list[float]] = defaultdict(list)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import subprocess
 import sys
 from pathlib import Path
 
@@ -131,3 +132,30 @@ def test_digests_tell_values_apart():
     assert len({digest(value) for value in (one, *others)}) == 4
     with pytest.raises(TypeError, match="object"):
         digest({"a": object()})
+
+
+def test_a_commit_is_that_of_the_code_and_changes_are_those_of_code(tmp_path, monkeypatch):
+    """Published runs are committed one by one, and all name the commit of the code that made them."""
+    monkeypatch.setattr(provenance, "ROOT", tmp_path)
+
+    def git(*words: str) -> str:
+        settings = ("-c", "user.name=a", "-c", "user.email=a@b", "-c", "commit.gpgsign=false")
+        done = subprocess.run(["git", *settings, *words], cwd=tmp_path, capture_output=True, text=True)
+        return done.stdout.strip()
+
+    def commit() -> str:
+        provenance.commit.cache_clear()
+        return provenance.commit()
+
+    git("init", "-q")
+    for path in ("snug/network.py", "reports/build.py", "snug/trained/a.safetensors"):
+        write(tmp_path, path, "1")
+        git("add", "-A")
+        git("commit", "-qm", path)
+        names = git("log", "--format=%h", "--abbrev=10").split()
+        assert commit() == names[-1]
+    write(tmp_path, "reports/build.py", "2")
+    assert commit() == names[-1]
+    write(tmp_path, "snug/network.py", "2")
+    assert commit() == f"{names[-1]}+changes"
+    provenance.commit.cache_clear()

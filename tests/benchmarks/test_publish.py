@@ -9,9 +9,9 @@ import pytest
 import torch
 
 from benchmarks import publish as command
-from benchmarks.plan.study import Show
-from benchmarks.provenance import commit
-from benchmarks.publish import all_usable, keep, publish
+from benchmarks.plan.study import Show, read_study
+from benchmarks.provenance import commit, digest_of_file
+from benchmarks.publish import all_usable, is_published, keep, publish
 from benchmarks.results.row import ResultsError, Row
 from benchmarks.results.run_folder import RunFolder
 from snug.networks.garment_network import make_network
@@ -38,7 +38,7 @@ def fall(tmp_path) -> str:
 
 def test_what_is_published_is_replaced_whole_or_left(tmp_path):
     whole, target = tmp_path / "run", tmp_path / "published" / "run"
-    made = "results.csv run.json report.pdf tables/energies.csv figures/lead.png x.vtkhdf"
+    made = "results.csv run.json report.pdf tables/energies.csv tables/energies_by_scene.csv figures/lead.png"
     for path in [*(whole / name for name in made.split()), target / "tables" / "old.csv"]:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(path.name)
@@ -50,8 +50,22 @@ def test_what_is_published_is_replaced_whole_or_left(tmp_path):
         "pbns", make_network("pbns", 141, 4, DEFAULT, seed=0), DEFAULT, origin={"a": 1}
     )
     network.save(whole / "models/pbns-seed0.safetensors")
+    rows = [
+        Row("garments", "flag", "newton-1", 0, "energy/total", "J", value=0.1, moved=(("twin", 1 / 3),))
+    ]
+    RunFolder(whole).write_rows(rows)
     keep(whole, target, Show(pictures=("lead",), networks=("pbns",)))
-    kept = ["energies.csv", "lead.png", "pbns-seed0.safetensors", "report.pdf", "results.csv", "run.json"]
+    published = RunFolder(target)
+    assert published.read_rows() == rows and rows[0].moved == (("twin", 0.3333),)
+    assert not published.changed({"results.csv": digest_of_file(whole / "results.csv")})
+    kept = [
+        "energies.csv",
+        "lead.png",
+        "pbns-seed0.safetensors",
+        "report.pdf",
+        "results.csv.gz",
+        "run.json",
+    ]
     assert sorted(path.name for path in target.rglob("*.*")) == kept
     assert [path.name for path in target.parent.iterdir()] == ["run"]
     rounded = TrainedModel.load(target / "models/pbns-seed0.safetensors")
@@ -95,7 +109,9 @@ def test_a_run_counts_where_it_ended_and_simulations_stalled_at_worst(
 @pytest.mark.slow
 def test_a_study_is_run_drawn_and_kept(tmp_path, fall):
     for _ in range(2):
+        assert not is_published(tmp_path / "kept" / "fall", read_study(fall), "abc")
         command.publish(fall, tmp_path / "runs", tmp_path / "kept", commit())
+    assert is_published(tmp_path / "kept" / "fall", read_study(fall), commit())
     rows = RunFolder(tmp_path / "kept" / "fall").read_rows()
     assert {row.method for row in rows} == {"simulation", "newton-1"}
     assert (tmp_path / "kept" / "fall" / "fall.gif").stat().st_size > 1000

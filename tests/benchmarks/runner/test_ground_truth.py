@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks import export
 from benchmarks.method import Simulated
-from benchmarks.methods import METHODS, find_method
+from benchmarks.methods import find_method
 from benchmarks.methods.declared_networks import TRAININGS
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
@@ -143,19 +143,6 @@ def test_the_same_simulations_serve_every_seed_and_training(tmp_path, monkeypatc
     assert "tshirt/walk" in labels and "tshirt/walk by fast-lbfgs-10" in labels
     *_, first, second = Schedule(plan).training(Network("tailornet", 0, "tshirt")).reads
     assert [first, second] == [("clips", f"tshirt-mixed-2/fast-lbfgs-10-{part}") for part in (0, 1)]
-
-
-def test_a_training_of_equal_data_has_the_steps_and_clips_that_it_declares(tmp_path):
-    entries = [entry for entry in METHODS if entry.training is not None]
-    cells = tuple(Cell(dressed_scene("kick"), entry, 0, ("garments",)) for entry in entries)
-    plan = plan_of(tmp_path, motions=Motions(train=("walk", "run", "bow"), test=("kick",)), cells=cells)
-    tasks = {network.name: Schedule(plan).training(network) for network in plan.networks}
-    for entry in entries:
-        task, training = tasks[entry.trained], entry.training
-        mixed = training.simulated.mixed if training.simulated else 0
-        assert sum(kind == "clips" for kind, _ in task.reads) == mixed
-        assert task.motions == ("walk", "run", "bow")
-        assert task.steps == plan.study.sizes.steps["snug"]
 
 
 @pytest.mark.slow
