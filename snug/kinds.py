@@ -80,11 +80,6 @@ class Kind:
             )
 
 
-def _handles(count: int, cost: float) -> Kind:
-    return Kind(name=f"handles-{count}", label=f"{count} handles", architecture="handles.StaticHandles",
-                sizes=(count,), recipe=HANDLES, static=True, cost=cost)  # fmt: skip
-
-
 KINDS = {
     kind.name: kind
     for kind in (
@@ -97,15 +92,10 @@ KINDS = {
              recipe=SANTESTEBAN2019, targets="vertices", closed_form=True),
         Kind(name="tailornet", label="TailorNet", architecture="tailornet.FrequencyMixture",
              recipe=TAILORNET, targets="bands", static=True),
-        _handles(20, 0.4),
-        _handles(40, 0.4),
-        _handles(80, 0.5),
-        Kind(name="handles-80-dynamic", label="80 handles, dynamic", architecture="handles.DynamicHandles",
-             sizes=(80,), recipe=HANDLES, closed_form=True),
+        Kind(name="handles-80", label="80 handles", architecture="handles.Handles", sizes=(80,),
+             recipe=HANDLES, static=True, cost=0.5),
         Kind(name="ncs", label="Neural Cloth Simulation", architecture="ncs.TwoBranches", recipe=NCS,
              cost=2.5),
-        Kind(name="ncs-static", label="Neural Cloth Simulation, static branch",
-             architecture="ncs.StaticBranch", recipe=NCS, static=True, cost=2.5),
     )
 }  # fmt: skip
 

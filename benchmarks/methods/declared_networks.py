@@ -72,7 +72,6 @@ def network(
     )
 
 
-COUNTS = (20, 40, 80)  # of handles
 NAMED = (
     network("untrained", "SNUG, untrained",
             "the SNUG network with a random last layer (SNUG itself starts as skinning)",
@@ -93,12 +92,8 @@ NAMED = (
             "low and high frequencies by static networks, trained on simulated vertices"),
     network("ncs", "",
             "static and dynamic branch apart, trained on the energies (Bertiche et al. 2022)"),
-    network("ncs-static", "",
-            "its static branch alone, trained on the energies of single frames",
-            base="ncs", pairing_group="ncs"),
-    network("handles-80-dynamic", "",
-            "recurrent network that moves the garment by 80 handles, trained on the energies as SNUG is",
-            base="handles-80", pairing_group="handles"),
+    network("handles-80", "",
+            "static network that moves the garment by 80 handles, trained on the energies"),
     network("snug-paper", "SNUG, paper's text", "SNUG by the paper's text, its closest points remembered",
             base="snug", pairing_group="snug"),
     network("snug-paper-contact", "SNUG, paper's text, simulator's contact",
@@ -107,12 +102,6 @@ NAMED = (
     network("snug-paper-nearest-vertex", "SNUG, paper's text, nearest body vertex",
             "SNUG by the paper's text, its contact planes at the nearest body vertices, as its authors' code",
             base="snug-paper", pairing_group="snug"),
-    *(
-        network(f"handles-{count}", "",
-                f"static network that moves the garment by {count} handles, trained on the energies",
-                reporting=Reporting(family="handles", level=count, pairing_group="handles"))
-        for count in COUNTS
-    ),
 )  # fmt: skip
 
 

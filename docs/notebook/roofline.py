@@ -23,7 +23,7 @@ from snug.motion.library import TRAIN
 from snug.networks.roll_out import prepare_frames
 from snug.training.train_network import untrained_model
 
-MEASURED = ("snug", "pbns", "handles-20", "handles-40", "handles-80", "ncs", "ncs-static", "tailornet")
+MEASURED = ("snug", "pbns", "handles-80", "ncs", "tailornet")
 REPEATS = 200
 
 

@@ -29,10 +29,7 @@ Record = dict[str, dict[str, str]]  # name of a result -> field -> its value as 
 
 # What may be called otherwise in another version: options of a run, places that a name is imported from.
 # Of several the first is taken that the checkout knows, so that one table serves both versions.
-FURTHER = (
-    "simulation,santesteban2019,tailornet,handles-20,ncs,ncs-static,"
-    "handles-80-dynamic,pbns-springs,snug+cleanup,snug-window6"
-)
+FURTHER = "simulation,santesteban2019,tailornet,handles-80,ncs,pbns-springs,snug+cleanup,snug-window6"
 UNSEEN = "tshirt/01_01_a,tshirt/dance_turn,tshirt/push_recovery"
 SMOKE = ("smoke", "--preset smoke")
 RUNS = {

@@ -51,7 +51,7 @@ KNOWN = {
     "pbns-paper": Style("", "#00725A", "^", "--"),
     "tailornet": Style("", "#661100", "H", ":"),
     "santesteban2019": Style("", "#AA4499", "d", (0.0, (1.0, 1.0))),
-    "handles": Style("Handles", "#CC6677", "p", "--"),
+    "handles-80": Style("", "#CC6677", "p", "--"),
     "supervised": Style("", "#E69F00", "s", (0.0, (6.0, 1.5))),
     "snug": Style("", "#0072B2", "o"),
     "snug-paper": Style("", "#94A000", "o", "-."),

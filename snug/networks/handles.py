@@ -1,10 +1,9 @@
-"""Networks of handles: from the pose or the motion to one affine transform for each, which move the garment.
+"""A network of handles: from the pose to one affine transform for each, which move the garment.
 
     offsets(theta)_v = sum_b w_b(v) A_b(theta) [(r_v - c_b) / h; 1]        (shape_functions)
 
-A small network gives the twelve numbers of each A_b: a perceptron that sees one pose, as PBNS does, or
-recurrent units that see the motion and their own past, as SNUG's do. What it can express is the span of the
-shape functions (method `handles-80-floor`).
+A small perceptron that sees one pose, as PBNS does, gives the twelve numbers of each A_b. What it can
+express is the span of the shape functions.
 
 The offsets are of the unposed garment r, as SNUG's, so that it is skinned. The centres c are farthest
 points of the garment, each the vertex that lies farthest from those before it. The weights are compact,
@@ -20,7 +19,6 @@ import torch
 from torch import Tensor, nn
 
 from snug.garments.garment import Garment
-from snug.kernels.gru import run_gru
 from snug.networks.frame_layout import FramePlan
 from snug.networks.garment_network import GarmentNetwork, perceptron
 
@@ -75,37 +73,14 @@ def compact_weights(distances: np.ndarray, reach: float) -> np.ndarray:
 WIDTHS = (256, 256)
 
 
-class HandleNetwork(GarmentNetwork):
-    """Base of the networks whose output moves `handles` handles.
+class Handles(GarmentNetwork):
+    """A perceptron of the pose whose output moves `handles` handles, without a state.
 
     Attributes:
         handles: their number.
         functions: (V, handles, 4), of `shape_functions`; not trained, and zero until `wear`.
-        numbers: last layer, from the activations of a subclass to twelve numbers a handle.
+        numbers: last layer, from the activations to twelve numbers a handle.
     """
-
-    def _add_handles(self, handles: int) -> None:
-        """Add last layer and shape functions. What a seed draws depends on which layers are added before."""
-        self.handles, self.numbers = handles, nn.Linear(WIDTHS[-1], 12 * handles)
-        self.functions = nn.Parameter(torch.zeros(self.vertices, handles, 4), requires_grad=False)
-
-    def wear(self, garment: Garment) -> None:
-        """Place the handles on the garment. Raises ValueError where it cannot have as many."""
-        self.functions.data.copy_(torch.from_numpy(shape_functions(garment, self.handles)))
-
-    def moved(self, activations: Tensor) -> Tensor:
-        """Return offsets (N, T, V, 3) [m] for the last activations (N, T, width)."""
-        numbers = self.output_scale * self.numbers(activations)
-        coordinates = numbers.unflatten(-1, (3, 4 * self.handles)) @ self.functions.flatten(1).T
-        return coordinates.transpose(-1, -2)
-
-    def last_layers(self) -> tuple[nn.Linear, ...]:
-        """Return the layer whose zeros are no offsets."""
-        return (self.numbers,)
-
-
-class StaticHandles(HandleNetwork):
-    """A perceptron of the pose, without a state."""
 
     feature_set = "pose"
     sequential = False
@@ -113,35 +88,24 @@ class StaticHandles(HandleNetwork):
     def __init__(self, inputs: int, vertices: int, handles: int) -> None:
         super().__init__(inputs, vertices)
         self.activations = perceptron(inputs, *WIDTHS, activation=nn.SiLU)
-        self._add_handles(handles)
+        self.handles, self.numbers = handles, nn.Linear(WIDTHS[-1], 12 * handles)
+        self.functions = nn.Parameter(torch.zeros(vertices, handles, 4), requires_grad=False)
+
+    def wear(self, garment: Garment) -> None:
+        """Place the handles on the garment. Raises ValueError where it cannot have as many."""
+        self.functions.data.copy_(torch.from_numpy(shape_functions(garment, self.handles)))
 
     def forward(self, features: Tensor, state: None = None) -> tuple[Tensor, None]:
         """Return offsets (N, T, V, 3) [m] and no state."""
-        return self.moved(self.activations(self.normalise(features))), None
+        numbers = self.output_scale * self.numbers(self.activations(self.normalise(features)))
+        coordinates = numbers.unflatten(-1, (3, 4 * self.handles)) @ self.functions.flatten(1).T
+        return coordinates.transpose(-1, -2), None
+
+    def last_layers(self) -> tuple[nn.Linear, ...]:
+        """Return the layer whose zeros are no offsets."""
+        return (self.numbers,)
 
     def lay_out(self, plan: FramePlan, x: slice) -> None:
         """Add the operations of `forward` for one frame to the plan."""
         x = plan.add_layers(self.activations, x)
         plan.add_handles(self.functions, plan.add_linear(self.numbers, x))
-
-
-class DynamicHandles(HandleNetwork):
-    """Recurrent units of the motion, two layers of SNUG's four; the state is theirs."""
-
-    feature_set = "motion"
-    sequential = True
-
-    def __init__(self, inputs: int, vertices: int, handles: int) -> None:
-        super().__init__(inputs, vertices)
-        self._add_handles(handles)
-        self.gru = nn.GRU(inputs, WIDTHS[-1], len(WIDTHS), batch_first=True)
-
-    def forward(self, features: Tensor, state: Tensor | None = None) -> tuple[Tensor, Tensor]:
-        """Return offsets (N, T, V, 3) [m] and the state after the last frame."""
-        hidden, state = run_gru(self.gru, self.normalise(features), state, closed_form=self.closed_form)
-        return self.moved(hidden), state
-
-    def lay_out(self, plan: FramePlan, x: slice) -> None:
-        """Add the operations of `forward` for one frame to the plan."""
-        hidden = plan.add_gru(self.gru, x)
-        plan.add_handles(self.functions, plan.add_linear(self.numbers, hidden))

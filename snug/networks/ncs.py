@@ -83,17 +83,22 @@ EXCHANGED = 0.2  # share of a batch
 JUDGED_BY_INERTIA = 2  # first frame of a window that has inertia
 
 
-class StaticBranch(GarmentNetwork):
-    """The static encoder and the decoder alone: from a pose to offsets, without a state."""
+class TwoBranches(GarmentNetwork):
+    """Both branches; the state (1, N, 512) is that of the dynamic branch, and its last code."""
 
     feature_set = "joint_motion"
-    sequential = False
+    sequential = True
+    lead = LEAD
 
     def __init__(self, inputs: int, vertices: int) -> None:
         super().__init__(inputs, vertices)
         self.static_encoder = perceptron(POSE_NUMBERS, *STATIC_WIDTHS)
         self.decoder = perceptron(WIDTH, *[WIDTH] * DECODER_LAYERS)
         self.offsets = nn.Linear(WIDTH, 3 * vertices, bias=False)
+        self.joint_encoder = perceptron(RATES, *JOINT_WIDTHS, bias=False)
+        joints = len(DESCRIBED) * JOINT_WIDTHS[-1]
+        self.dynamic_encoder = perceptron(joints, WIDTH, WIDTH, bias=False)
+        self.gru = nn.GRU(WIDTH, WIDTH, bias=False, batch_first=True)
 
     def normalise_by(self, mean: np.ndarray, std: np.ndarray) -> None:
         """Set mean (D,) and spread (D,) of the inputs; the zero of the motion stays a body at rest."""
@@ -107,34 +112,6 @@ class StaticBranch(GarmentNetwork):
         """Return offsets (N, T, V, 3) [m] of codes (N, T, 512)."""
         flat = self.output_scale * self.offsets(self.decoder(code))
         return flat.unflatten(-1, (self.vertices, 3))
-
-    def forward(self, features: Tensor, state: None = None) -> tuple[Tensor, Tensor | None]:
-        """Return offsets (N, T, V, 3) [m] and no state."""
-        return self.decode(self.static_code(features)), None
-
-    def lay_out(self, plan: FramePlan, x: slice) -> None:
-        """Add the operations of `forward` for one frame to the plan."""
-        self._lay_out_decoder(plan, self._lay_out_static(plan, x))
-
-    def _lay_out_static(self, plan: FramePlan, x: slice) -> slice:
-        return plan.add_layers(self.static_encoder, slice(x.start, x.start + POSE_NUMBERS))
-
-    def _lay_out_decoder(self, plan: FramePlan, code: slice) -> None:
-        plan.add_offsets((self.offsets, plan.add_layers(self.decoder, code)))
-
-
-class TwoBranches(StaticBranch):
-    """Both branches; the state (1, N, 512) is that of the dynamic branch, and its last code."""
-
-    sequential = True
-    lead = LEAD
-
-    def __init__(self, inputs: int, vertices: int) -> None:
-        super().__init__(inputs, vertices)
-        self.joint_encoder = perceptron(RATES, *JOINT_WIDTHS, bias=False)
-        joints = len(DESCRIBED) * JOINT_WIDTHS[-1]
-        self.dynamic_encoder = perceptron(joints, WIDTH, WIDTH, bias=False)
-        self.gru = nn.GRU(WIDTH, WIDTH, bias=False, batch_first=True)
 
     def dynamic_code(self, features: Tensor, state: Tensor | None) -> tuple[Tensor, Tensor]:
         """Return z_d (N, T, 512) of features (N, T, D), and the state after the last frame."""
@@ -168,9 +145,9 @@ class TwoBranches(StaticBranch):
         for layer in self.joint_encoder:
             if isinstance(layer, nn.Linear):
                 motion = plan.add_linear(_repeated(layer, len(DESCRIBED)), motion, nn.ReLU)
-        code = self._lay_out_static(plan, x)
+        code = plan.add_layers(self.static_encoder, slice(x.start, x.start + POSE_NUMBERS))
         plan.add_sum(code, plan.add_gru(self.gru, plan.add_layers(self.dynamic_encoder, motion)))
-        self._lay_out_decoder(plan, code)
+        plan.add_offsets((self.offsets, plan.add_layers(self.decoder, code)))
 
 
 def _repeated(layer: nn.Linear, count: int) -> nn.Linear:
