@@ -84,20 +84,56 @@ KINDS = {
     kind.name: kind
     for kind in (
         Kind(name="snug", label="SNUG", architecture="regressor.Regressor", closed_form=True),
-        Kind(name="pbns", label="PBNS", architecture="pbns.PoseSpaceDeformation", recipe=PBNS,
-             static=True, cost=0.4),
-        Kind(name="supervised", label="Supervised", architecture="regressor.Regressor", recipe=SUPERVISED,
-             targets="vertices", closed_form=True),
-        Kind(name="santesteban2019", label="Santesteban 2019", architecture="santesteban2019.FitAndWrinkles",
-             recipe=SANTESTEBAN2019, targets="vertices", closed_form=True),
-        Kind(name="tailornet", label="TailorNet", architecture="tailornet.FrequencyMixture",
-             recipe=TAILORNET, targets="bands", static=True),
-        Kind(name="handles-80", label="80 handles", architecture="handles.Handles", sizes=(80,),
-             recipe=HANDLES, static=True, cost=0.5),
-        Kind(name="ncs", label="Neural Cloth Simulation", architecture="ncs.TwoBranches", recipe=NCS,
-             cost=2.5),
+        Kind(
+            name="pbns",
+            label="PBNS",
+            architecture="pbns.PoseSpaceDeformation",
+            recipe=PBNS,
+            static=True,
+            cost=0.4,
+        ),
+        Kind(
+            name="supervised",
+            label="Supervised",
+            architecture="regressor.Regressor",
+            recipe=SUPERVISED,
+            targets="vertices",
+            closed_form=True,
+        ),
+        Kind(
+            name="santesteban2019",
+            label="Santesteban 2019",
+            architecture="santesteban2019.FitAndWrinkles",
+            recipe=SANTESTEBAN2019,
+            targets="vertices",
+            closed_form=True,
+        ),
+        Kind(
+            name="tailornet",
+            label="TailorNet",
+            architecture="tailornet.FrequencyMixture",
+            recipe=TAILORNET,
+            targets="bands",
+            static=True,
+        ),
+        Kind(
+            name="handles-80",
+            label="80 handles",
+            architecture="handles.Handles",
+            sizes=(80,),
+            recipe=HANDLES,
+            static=True,
+            cost=0.5,
+        ),
+        Kind(
+            name="ncs",
+            label="Neural Cloth Simulation",
+            architecture="ncs.TwoBranches",
+            recipe=NCS,
+            cost=2.5,
+        ),
     )
-}  # fmt: skip
+}
 
 
 def find_kind(name: str) -> Kind:
