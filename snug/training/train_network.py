@@ -45,6 +45,8 @@ class TrainingLoop:
     ) -> None:
         self.trainer, self.log, self.every, self.checkpoint = trainer, log, every, checkpoint
         self.progress = progress
+        # Once: it digests the whole training set.
+        self.identity = describe_run(trainer, every=every) if checkpoint else {}
         self.setup_seconds, self.done, self.seconds = setup_seconds, 0, 0.0
         self.history: list[dict[str, float]] = []
         self.recent: list[dict[str, float]] = []
@@ -99,13 +101,13 @@ class TrainingLoop:
             "recent": self.recent,
             "trainer": facts,
         }
-        checkpoint.write(describe_run(self.trainer, every=self.every), tensors, state)
+        checkpoint.write(self.identity, tensors, state)
         self._saved = time.perf_counter()
 
     def _resume(self) -> None:
         if self.checkpoint is None:
             return
-        stored = self.checkpoint.read(describe_run(self.trainer, every=self.every))
+        stored = self.checkpoint.read(self.identity)
         if stored is None:
             return
         tensors, state = stored
