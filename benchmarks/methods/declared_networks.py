@@ -21,6 +21,7 @@ from snug.named_recipes import (
     SUPERVISED_VERTICES,
 )
 from snug.recipe import DEFAULT
+from snug.trained import network_name, trained_networks
 
 TRAININGS = {
     **{
@@ -35,7 +36,8 @@ TRAININGS = {
 }
 TRAININGS |= {
     f"{name}-packaged": replace(TRAININGS[name], packaged=name)
-    for name in ("snug", "supervised-vertices", "pbns")
+    for name in (*TRAININGS,)
+    if network_name(name, "tshirt", 0) in trained_networks()
 }
 
 

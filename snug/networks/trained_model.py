@@ -106,7 +106,7 @@ class TrainedModel:
         Traceback (most recent call last):
         ...
         snug.networks.trained_model.ModelFileError: tshirt-snug: neither a model file nor a network of the \
-package: pbns-tshirt, snug-tshirt, supervised-vertices-tshirt
+package: pbns-tshirt, ...
         """
         path = _find_file(path)
         try:
