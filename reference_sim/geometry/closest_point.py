@@ -66,22 +66,16 @@ def search(points, samples, everywhere, exact, mesh, pose, faces, barycentric, c
     )
     if count > 0:
         set_boxes(everywhere.leaves, mesh, pose)
+        corners = mesh.corners
         fit_leaf(0, mesh, pose)  # whoever asks for NaN gets its first face
-        faces[missed[:count]] = mesh.order[0]
-        barycentric[missed[:count]] = 1.0 / 3.0
-        closest[missed[:count]] = mesh.corners[0].sum(axis=0) / 3.0
-        _search_groups(
-            missed[:count].copy(),
-            points,
-            everywhere,
-            exact,
-            mesh,
-            pose,
-            faces,
-            barycentric,
-            closest,
-            missed,
-        )
+        some = missed[:count].copy()
+        for s in some:  # in loops: numpy's sum and rows take numba seconds
+            faces[s] = mesh.order[0]
+            for c in range(3):
+                total = corners[0, 0, c] + corners[0, 1, c] + corners[0, 2, c]
+                barycentric[s, c] = 1.0 / 3.0
+                closest[s, c] = total / 3.0
+        _search_groups(some, points, everywhere, exact, mesh, pose, faces, barycentric, closest, missed)
 
 
 @njit(cache=True, error_model="numpy")
