@@ -24,7 +24,7 @@ sizes = "smoke"
 scenes = ["free_fall"]
 methods = ["simulation", "newton-1"]
 [show]
-pictures = ["error_against_time_free_fall"]
+pictures = ["error_against_time"]
 films."fall.gif" = "--scene free_fall --methods simulation,newton-1 --width 100"
 """
 
