@@ -24,7 +24,6 @@ sizes = "smoke"
 scenes = ["free_fall"]
 methods = ["simulation", "newton-1"]
 [show]
-pictures = ["error_against_time"]
 films."fall.gif" = "--scene free_fall --methods simulation,newton-1 --width 100"
 """
 
