@@ -19,7 +19,7 @@ from reference_sim.cloth import Cloth
 from reference_sim.energies.bend_hinge_kernels import batch, constraint, lanes, vertex_block
 from reference_sim.energies.energy import Energy
 from reference_sim.kernels.kernel_cache import njit
-from reference_sim.kernels.lanes import LANES_FLOAT64, add_blocks, arctan2
+from reference_sim.kernels.lanes import LANES_FLOAT64, add_blocks, arctan2, copy_lanes
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from reference_sim.kernels.lanes import BlockPlaces
 
 SCALINGS = ("length_area", "none")
-BLOCKS = 39  # rows of lanes before those of the blocks, in _hessian
+SIGNS = (-1.0, 1.0, 0.0, 0.0)  # r of the corners of a hinge, in _hessian
 
 
 class BendHinge(Energy):
@@ -187,7 +187,7 @@ def _hessian(x, hinges, stiffness, rest, convexity, slots, base, stride, data):
     but for antisymmetric parts that cancel between both faces.
     """
     L, count = LANES_FLOAT64, len(hinges)
-    u = np.empty((BLOCKS + 90) * L)
+    u, blocks = np.empty(55 * L), np.empty(90 * L)
     for begin in range(0, count, L):
         for n in range(L):
             h = min(begin + n, count - 1)
@@ -226,49 +226,51 @@ def _hessian(x, hinges, stiffness, rest, convexity, slots, base, stride, data):
             u[33 * L + n], u[34 * L + n] = ax * ey - ay * ex, by * ez - bz * ey
             u[35 * L + n], u[36 * L + n] = bz * ex - bx * ez, bx * ey - by * ex
             u[37 * L + n], u[38 * L + n] = 0.5 * na / square, 0.5 * nb / square
-            _block(u, n, 0, 0, 0, -1.0, -1.0)
-            _block(u, n, 1, 1, 0, 1.0, -1.0)
-            _block(u, n, 2, 1, 1, 1.0, 1.0)
-            _block(u, n, 3, 2, 0, 0.0, -1.0)
-            _block(u, n, 4, 2, 1, 0.0, 1.0)
-            _block(u, n, 5, 2, 2, 0.0, 0.0)
-            _block(u, n, 6, 3, 0, 0.0, -1.0)
-            _block(u, n, 7, 3, 1, 0.0, 1.0)
-            _block(u, n, 8, 3, 2, 0.0, 0.0)
-            _block(u, n, 9, 3, 3, 0.0, 0.0)
+        place = 0
+        for a in range(4):
+            for b in range(a + 1):
+                _block(u, place, a, b, blocks)
+                place += 1
         for n in range(min(L, count - begin)):
-            add_blocks(u, BLOCKS, n, begin + n, 4, slots, base, stride, data)
+            add_blocks(blocks, n, begin + n, 4, slots, base, stride, data)
 
 
-@njit(cache=True, inline="always")
-def _block(u, n, place, a, b, ra, rb):
-    """Write the block of corners a, b of the hinge in lane n, from what _hessian has put into u."""
-    L = LANES_FLOAT64
-    k, s = u[12 * L + n], u[13 * L + n]
-    wa, wb, va, vb = u[(20 + a) * L + n], u[(20 + b) * L + n], u[(24 + a) * L + n], u[(24 + b) * L + n]
-    ax, ay, az, bx, by, bz = (
-        u[14 * L + n], u[15 * L + n], u[16 * L + n], u[17 * L + n], u[18 * L + n], u[19 * L + n]
-    )  # fmt: skip
-    ex, ey, ez = u[28 * L + n], u[29 * L + n], u[30 * L + n]
-    c, d = s * (wa * wb + ra * rb * u[37 * L + n]), -s * (va * vb + ra * rb * u[38 * L + n])
-    px, py, pz = c * u[31 * L + n], c * u[32 * L + n], c * u[33 * L + n]
-    qx, qy, qz = d * u[34 * L + n], d * u[35 * L + n], d * u[36 * L + n]
-    gx, gy, gz = k * u[3 * b * L + n], k * u[(3 * b + 1) * L + n], k * u[(3 * b + 2) * L + n]
-    f = -s * ra * wb
-    yx, yy, yz = px + f * ex + wa * gx, py + f * ey + wa * gy, pz + f * ez + wa * gz
-    f = s * ra * vb
-    hx, hy, hz = qx + f * ex - va * gx, qy + f * ey - va * gy, qz + f * ez - va * gz
-    f = -s * rb * wa
-    zx, zy, zz = px + f * ex, py + f * ey, pz + f * ez
-    f = s * rb * va
-    tx, ty, tz = qx + f * ex, qy + f * ey, qz + f * ez
-    at = (BLOCKS + 9 * place) * L + n
-    u[at] = ax * yx + zx * ax + bx * hx + tx * bx
-    u[at + L] = ax * yy + zx * ay + bx * hy + tx * by
-    u[at + 2 * L] = ax * yz + zx * az + bx * hz + tx * bz
-    u[at + 3 * L] = ay * yx + zy * ax + by * hx + ty * bx
-    u[at + 4 * L] = ay * yy + zy * ay + by * hy + ty * by
-    u[at + 5 * L] = ay * yz + zy * az + by * hz + ty * bz
-    u[at + 6 * L] = az * yx + zz * ax + bz * hx + tz * bx
-    u[at + 7 * L] = az * yy + zz * ay + bz * hy + tz * by
-    u[at + 8 * L] = az * yz + zz * az + bz * hz + tz * bz
+@njit(cache=True)
+def _block(u, place, a, b, blocks):
+    """Write the blocks of corners a, b of the hinges of u, as _hessian lays it out, into blocks."""
+    L, ra, rb = LANES_FLOAT64, SIGNS[a], SIGNS[b]
+    # Only loops over rows that the compiler knows become vector instructions.
+    for row, of in ((39, 20 + a), (40, 20 + b), (41, 24 + a), (42, 24 + b)):
+        copy_lanes(u, of, u, row)
+    for i in range(3):
+        copy_lanes(u, 3 * b + i, u, 43 + i)
+    for n in range(L):
+        k, s = u[12 * L + n], u[13 * L + n]
+        wa, wb, va, vb = u[39 * L + n], u[40 * L + n], u[41 * L + n], u[42 * L + n]
+        ax, ay, az, bx, by, bz = (
+            u[14 * L + n], u[15 * L + n], u[16 * L + n], u[17 * L + n], u[18 * L + n], u[19 * L + n]
+        )  # fmt: skip
+        ex, ey, ez = u[28 * L + n], u[29 * L + n], u[30 * L + n]
+        c, d = s * (wa * wb + ra * rb * u[37 * L + n]), -s * (va * vb + ra * rb * u[38 * L + n])
+        px, py, pz = c * u[31 * L + n], c * u[32 * L + n], c * u[33 * L + n]
+        qx, qy, qz = d * u[34 * L + n], d * u[35 * L + n], d * u[36 * L + n]
+        gx, gy, gz = k * u[43 * L + n], k * u[44 * L + n], k * u[45 * L + n]
+        f = -s * ra * wb
+        yx, yy, yz = px + f * ex + wa * gx, py + f * ey + wa * gy, pz + f * ez + wa * gz
+        f = s * ra * vb
+        hx, hy, hz = qx + f * ex - va * gx, qy + f * ey - va * gy, qz + f * ez - va * gz
+        f = -s * rb * wa
+        zx, zy, zz = px + f * ex, py + f * ey, pz + f * ez
+        f = s * rb * va
+        tx, ty, tz = qx + f * ex, qy + f * ey, qz + f * ez
+        u[46 * L + n] = ax * yx + zx * ax + bx * hx + tx * bx
+        u[47 * L + n] = ax * yy + zx * ay + bx * hy + tx * by
+        u[48 * L + n] = ax * yz + zx * az + bx * hz + tx * bz
+        u[49 * L + n] = ay * yx + zy * ax + by * hx + ty * bx
+        u[50 * L + n] = ay * yy + zy * ay + by * hy + ty * by
+        u[51 * L + n] = ay * yz + zy * az + by * hz + ty * bz
+        u[52 * L + n] = az * yx + zz * ax + bz * hx + tz * bx
+        u[53 * L + n] = az * yy + zz * ay + bz * hy + tz * by
+        u[54 * L + n] = az * yz + zz * az + bz * hz + tz * bz
+    for i in range(9):
+        copy_lanes(u, 46 + i, blocks, 9 * place + i)

@@ -18,14 +18,12 @@ from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy
 from reference_sim.energies.stretch_stvk_kernels import batch, constraint, lanes, strain, vertex_block
 from reference_sim.kernels.kernel_cache import njit
-from reference_sim.kernels.lanes import LANES_FLOAT64, add_blocks
+from reference_sim.kernels.lanes import LANES_FLOAT64, add_blocks, copy_lanes
 
 if TYPE_CHECKING:
     from torch import Tensor
 
     from reference_sim.kernels.lanes import BlockPlaces
-
-BLOCKS = 29  # rows of lanes before those of the blocks, in _hessian
 
 
 class StretchStVK(Energy):
@@ -213,7 +211,7 @@ def _linear_stress(x, step, faces, Dm_inverse, lam, mu, stress):
 def _hessian(x, faces, Dm_inverse, areas, lam, mu, stress, slots, base, stride, data):
     """Add A [(b_a.S b_c) I + lambda (F b_a)(F b_c)^T + mu ((F b_c)(F b_a)^T + (b_a.b_c) F F^T)]."""
     L, count = LANES_FLOAT64, len(faces)
-    u = np.empty((BLOCKS + 54) * L)
+    u, blocks = np.empty(48 * L), np.empty(54 * L)
     for begin in range(0, count, L):
         for n in range(L):
             f = min(begin + n, count - 1)
@@ -242,36 +240,42 @@ def _hessian(x, faces, Dm_inverse, areas, lam, mu, stress, slots, base, stride, 
             u[23 * L + n], u[24 * L + n] = px * px + qx * qx, py * px + qy * qx
             u[25 * L + n], u[26 * L + n] = py * py + qy * qy, pz * px + qz * qx
             u[27 * L + n], u[28 * L + n] = pz * py + qz * qy, pz * pz + qz * qz
-            _block(u, n, 0, 0, 0, lam, mu)
-            _block(u, n, 1, 1, 0, lam, mu)
-            _block(u, n, 2, 1, 1, lam, mu)
-            _block(u, n, 3, 2, 0, lam, mu)
-            _block(u, n, 4, 2, 1, lam, mu)
-            _block(u, n, 5, 2, 2, lam, mu)
+        place = 0
+        for a in range(3):
+            for c in range(a + 1):
+                _block(u, place, a, c, lam, mu, blocks)
+                place += 1
         for n in range(min(L, count - begin)):
-            add_blocks(u, BLOCKS, n, begin + n, 3, slots, base, stride, data)
+            add_blocks(blocks, n, begin + n, 3, slots, base, stride, data)
 
 
-@njit(cache=True, inline="always")
-def _block(u, n, place, a, c, lam, mu):
-    """Write the block of corners a, c of the face in lane n, from what _hessian has put into u."""
+@njit(cache=True)
+def _block(u, place, a, c, lam, mu, blocks):
+    """Write the blocks of corners a, c of the faces of u, as _hessian lays it out, into blocks."""
+    # Only loops over rows that the compiler knows become vector instructions.
     L = LANES_FLOAT64
-    ax, ay, az = u[3 * a * L + n], u[(3 * a + 1) * L + n], u[(3 * a + 2) * L + n]
-    cx, cy, cz = u[3 * c * L + n], u[(3 * c + 1) * L + n], u[(3 * c + 2) * L + n]
-    a0, a1, c0, c1 = (
-        u[(17 + 2 * a) * L + n], u[(18 + 2 * a) * L + n], u[(17 + 2 * c) * L + n], u[(18 + 2 * c) * L + n]
-    )  # fmt: skip
-    s00, s11, s01, area = u[13 * L + n], u[14 * L + n], u[15 * L + n], u[16 * L + n]
-    s = a0 * (s00 * c0 + s01 * c1) + a1 * (s01 * c0 + s11 * c1)
-    k, m = lam * area, mu * area
-    b = m * (a0 * c0 + a1 * c1)
-    at = (BLOCKS + 9 * place) * L + n
-    u[at] = (k + m) * (ax * cx) + b * u[23 * L + n] + s
-    u[at + L] = k * (ax * cy) + m * (cx * ay) + b * u[24 * L + n]
-    u[at + 2 * L] = k * (ax * cz) + m * (cx * az) + b * u[26 * L + n]
-    u[at + 3 * L] = k * (ay * cx) + m * (cy * ax) + b * u[24 * L + n]
-    u[at + 4 * L] = (k + m) * (ay * cy) + b * u[25 * L + n] + s
-    u[at + 5 * L] = k * (ay * cz) + m * (cy * az) + b * u[27 * L + n]
-    u[at + 6 * L] = k * (az * cx) + m * (cz * ax) + b * u[26 * L + n]
-    u[at + 7 * L] = k * (az * cy) + m * (cz * ay) + b * u[27 * L + n]
-    u[at + 8 * L] = (k + m) * (az * cz) + b * u[28 * L + n] + s
+    for i in range(3):
+        copy_lanes(u, 3 * a + i, u, 29 + i)
+        copy_lanes(u, 3 * c + i, u, 32 + i)
+    for i in range(2):
+        copy_lanes(u, 17 + 2 * a + i, u, 35 + i)
+        copy_lanes(u, 17 + 2 * c + i, u, 37 + i)
+    for n in range(L):
+        ax, ay, az = u[29 * L + n], u[30 * L + n], u[31 * L + n]
+        cx, cy, cz = u[32 * L + n], u[33 * L + n], u[34 * L + n]
+        a0, a1, c0, c1 = u[35 * L + n], u[36 * L + n], u[37 * L + n], u[38 * L + n]
+        s00, s11, s01, area = u[13 * L + n], u[14 * L + n], u[15 * L + n], u[16 * L + n]
+        s = a0 * (s00 * c0 + s01 * c1) + a1 * (s01 * c0 + s11 * c1)
+        k, m = lam * area, mu * area
+        b = m * (a0 * c0 + a1 * c1)
+        u[39 * L + n] = (k + m) * (ax * cx) + b * u[23 * L + n] + s
+        u[40 * L + n] = k * (ax * cy) + m * (cx * ay) + b * u[24 * L + n]
+        u[41 * L + n] = k * (ax * cz) + m * (cx * az) + b * u[26 * L + n]
+        u[42 * L + n] = k * (ay * cx) + m * (cy * ax) + b * u[24 * L + n]
+        u[43 * L + n] = (k + m) * (ay * cy) + b * u[25 * L + n] + s
+        u[44 * L + n] = k * (ay * cz) + m * (cy * az) + b * u[27 * L + n]
+        u[45 * L + n] = k * (az * cx) + m * (cz * ax) + b * u[26 * L + n]
+        u[46 * L + n] = k * (az * cy) + m * (cz * ay) + b * u[27 * L + n]
+        u[47 * L + n] = (k + m) * (az * cz) + b * u[28 * L + n] + s
+    for i in range(9):
+        copy_lanes(u, 39 + i, blocks, 9 * place + i)

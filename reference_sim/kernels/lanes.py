@@ -62,12 +62,12 @@ def arctan2(y, x):
 
 
 @njit(cache=True)
-def add_blocks(u, row, n, e, corners, slots, base, stride, data):
+def add_blocks(u, n, e, corners, slots, base, stride, data):
     """Add the 3 x 3 blocks of element e in lane n of u to the values of a matrix, see `BlockPlaces`.
 
-    Of its corners x corners blocks, u holds those on and below the diagonal, row after row, from `row`
-    on.
+    Of its corners x corners blocks, u holds those on and below the diagonal, row after row.
     """
+    row = 0
     for a in range(corners):
         for b in range(a + 1):
             slot = slots[e, a * corners + b]
@@ -185,11 +185,15 @@ _intrinsic: Any = intrinsic  # to a caller it has not the arguments of the funct
 
 @_intrinsic
 def copy_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
-    """Copy row i of source to row j of target: rows of TRAINING_LANES numbers in flat float32 arrays."""
+    """Copy row i of source to row j of target, flat arrays.
+
+    A row has TRAINING_LANES numbers of float32, or LANES_FLOAT64.
+    """
+    lanes = LANES_FLOAT64 if source.dtype == types.float64 else L
 
     def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        source_row = _place(context, builder, signature.args[:2], args[:2], L, L)
-        target_row = _place(context, builder, signature.args[2:], args[2:], L, L)
+        source_row = _place(context, builder, signature.args[:2], args[:2], lanes, lanes)
+        target_row = _place(context, builder, signature.args[2:], args[2:], lanes, lanes)
         builder.store(builder.load(source_row, align=4), target_row, align=4)
         return context.get_dummy_value()
 
