@@ -45,13 +45,15 @@ def _sweep(x, faces, low, high, order, hit):
                 continue
             if _neighbours(faces[e], faces[f]):
                 continue
-            crossings = _crossings(x, faces[e], faces[f], ends, 0)
+            # Of a literal numba compiles a function anew.
+            crossings = _crossings(x, faces[e], faces[f], ends, np.int64(0))
             crossings = _crossings(x, faces[f], faces[e], ends, crossings)
             if crossings > 0:
                 hit[e] = True
                 hit[f] = True
             if crossings > 1:
-                length += np.sqrt(((ends[0] - ends[1]) ** 2).sum())
+                dx, dy, dz = ends[0, 0] - ends[1, 0], ends[0, 1] - ends[1, 1], ends[0, 2] - ends[1, 2]
+                length += np.sqrt(dx * dx + dy * dy + dz * dz)
     return length
 
 

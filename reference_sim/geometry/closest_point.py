@@ -67,7 +67,7 @@ def search(points, samples, everywhere, exact, mesh, pose, faces, barycentric, c
     if count > 0:
         set_boxes(everywhere.leaves, mesh, pose)
         corners = mesh.corners
-        fit_leaf(0, mesh, pose)  # whoever asks for NaN gets its first face
+        fit_leaf(np.int64(0), mesh, pose)  # whoever asks for NaN gets its first face
         some = missed[:count].copy()
         for s in some:  # in loops: numpy's sum and rows take numba seconds
             faces[s] = mesh.order[0]

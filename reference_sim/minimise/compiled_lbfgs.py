@@ -8,11 +8,14 @@ are one compiled function, of which the kernels of the terms are arguments.
 from __future__ import annotations
 
 from collections import namedtuple
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from reference_sim.cholesky import WIDTH, ScalarPattern, factorise, solve
+from reference_sim.cloth import Cloth
+from reference_sim.energies import bend_hinge_kernels, contact_penalty, stretch_stvk_kernels
 from reference_sim.kernels.fast_kernels import StepTerms, step_terms
 from reference_sim.kernels.kernel_cache import call_each, kernel_argument, njit
 from reference_sim.kernels.lanes import FAST, HALF, SCRATCH, Float32Lanes, to_blocks
@@ -191,7 +194,7 @@ class CompiledLBFGS:
     ) -> None:
         self.potential, self.max_iterations = potential, max_iterations
         self._terms = terms = step_terms(potential, "float32_lanes", "CompiledLBFGS")
-        self._lanes: tuple[Float32Lanes, ...] = terms.kernels
+        self._lanes, self._places = _with_common(terms.kernels)
         self._gradients = [kernel_argument(lanes.gradient) for lanes in self._lanes]
         self._weight = mean_weight(potential)
         self._tolerance = tolerance * self._weight
@@ -202,7 +205,7 @@ class CompiledLBFGS:
             terms.weights.astype(np.float32),
             3 * np.asarray(cloth.pins, np.int64),
         )
-        self._factor, self._stiffening = _factor(cloth.free, cloth.rest_positions, terms)
+        self._factor, self._stiffening = _factor(cloth, terms, self._lanes)
         size = (MEMORY, 3 * count)
         self._memory = Memory(
             np.empty(size, np.float32), np.empty(size, np.float32), np.empty(MEMORY, np.float32)
@@ -254,7 +257,7 @@ class CompiledLBFGS:
         inertia, _, *elements = self._energies.tolist()
         values = {self._terms.inertia.name: inertia}
         values |= {term.name: term.value_and_gradient(x)[0] for term in self._terms.weighing}
-        values |= {term.name: value for term, value in zip(self._terms.elements, elements)}
+        values |= {e.name: elements[k] for e, k in zip(self._terms.elements, self._places)}
         terms = {energy.name: values[energy.name] for energy in self.potential.energies}
         return Result(
             positions=x,
@@ -268,18 +271,42 @@ class CompiledLBFGS:
         )
 
 
-def _factor(free: np.ndarray, rest: np.ndarray, terms: StepTerms) -> tuple[Any, list[tuple]]:
-    """Lay the preconditioner of free vertices (V,) bool out.
+COMMON = stretch_stvk_kernels.lanes, bend_hinge_kernels.lanes, contact_penalty.lanes
+_NONE, _VECTORS = np.empty(0), np.empty((0, 3))
+NOTHING: Any = SimpleNamespace(  # a term of any of these kinds, without elements
+    stencils=_VECTORS.astype(int), Dm_inverse=_VECTORS, areas=_NONE, lam=0.0, mu=0.0, stiffness=_NONE,
+    rest_angles=_NONE, rest_samples=_VECTORS, weights=_VECTORS, points=_VECTORS, normals=_VECTORS,
+    margin=0.0,
+)  # fmt: skip
 
-    Returns pattern and constant values, at positions rest (V, 3) [m], with room for the factor; and of
-    each term whose stiffness changes from step to step its number, its kernel and the places of its
-    lanes.
+
+def _with_common(kernels: tuple[Float32Lanes, ...]) -> tuple[list[Float32Lanes], list[int]]:
+    """Return the kernels of terms and those of the common kinds that are absent, without elements.
+
+    So `descend` is compiled once for all cloths of these kinds. Returns the places of the terms, too.
     """
+    common = [lanes(NOTHING) for lanes in COMMON]
+    known = [lanes.gradient for lanes in common]
+    places = [known.index(lanes.gradient) for lanes in kernels if lanes.gradient in known]
+    if len(places) < len(kernels) or places != sorted(set(places)):
+        return list(kernels), list(range(len(kernels)))
+    for place, lanes in zip(places, kernels):
+        common[place] = lanes
+    return common, places
+
+
+def _factor(cloth: Cloth, terms: StepTerms, lanes: list[Float32Lanes]) -> tuple[Any, list[tuple]]:
+    """Lay the preconditioner of free vertices out.
+
+    Returns pattern and constant values, at rest, with room for the factor; and of each term whose
+    stiffness changes from step to step its number, its kernel and the places of its lanes.
+    """
+    free, rest = cloth.free, cloth.rest_positions
     number = np.full(len(free), -1)
     number[free] = np.arange(free.sum())
     fixed = [e for e in (terms.inertia, *terms.elements) if 1 in e.constant]
-    changing = [(k, lanes) for k, lanes in enumerate(terms.kernels) if lanes.stiffness is not None]
-    stencils = [number[e.stencils] for e in fixed] + [number[lanes.stencils] for _, lanes in changing]
+    changing = [(k, term) for k, term in enumerate(lanes) if term.stiffness is not None]
+    stencils = [number[e.stencils] for e in fixed] + [number[term.stencils] for _, term in changing]
     pattern = ScalarPattern(int(free.sum()), stencils)
     # Left of the diagonal, then the diagonal.
     constant = np.zeros(len(pattern.row_columns) + pattern.count)
@@ -294,8 +321,8 @@ def _factor(free: np.ndarray, rest: np.ndarray, terms: StepTerms) -> tuple[Any, 
         np.empty(entries), np.empty(n), np.zeros(n), np.empty(n, np.int64), np.zeros((n, WIDTH)),
     )  # fmt: skip
     stiffening = []
-    for k, lanes in changing:
-        places = pattern.places(number[lanes.stencils])
-        blocks = to_blocks(places.reshape(len(places), -1))
-        stiffening.append((k, kernel_argument(lanes.stiffness), blocks))
+    for k, term in changing:
+        places = pattern.places(number[term.stencils])
+        blocks = to_blocks(places.reshape(len(places), places.shape[1] ** 2))
+        stiffening.append((k, kernel_argument(term.stiffness), blocks))
     return factor, stiffening
