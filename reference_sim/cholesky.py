@@ -199,8 +199,8 @@ def factorise(
     y (n,) zeros and filled (n,): room to work in.
     """
     count, off = len(D), len(row_columns)
-    filled[:] = starts[:-1]
     for k in range(count):
+        filled[k] = starts[k]
         for p in range(row_starts[k], row_starts[k + 1]):
             y[row_columns[p]] = values[p]
         pivot = values[off + k]

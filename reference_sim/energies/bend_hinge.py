@@ -226,17 +226,15 @@ def _hessian(x, hinges, stiffness, rest, convexity, slots, base, stride, data):
             u[33 * L + n], u[34 * L + n] = ax * ey - ay * ex, by * ez - bz * ey
             u[35 * L + n], u[36 * L + n] = bz * ex - bx * ez, bx * ey - by * ex
             u[37 * L + n], u[38 * L + n] = 0.5 * na / square, 0.5 * nb / square
-        place = 0
         for a in range(4):
             for b in range(a + 1):
-                _block(u, place, a, b, blocks)
-                place += 1
+                _block(u, a, b, blocks)
         for n in range(min(L, count - begin)):
             add_blocks(blocks, n, begin + n, 4, slots, base, stride, data)
 
 
 @njit(cache=True)
-def _block(u, place, a, b, blocks):
+def _block(u, a, b, blocks):
     """Write the blocks of corners a, b of the hinges of u, as _hessian lays it out, into blocks."""
     L, ra, rb = LANES_FLOAT64, SIGNS[a], SIGNS[b]
     # Only loops over rows that the compiler knows become vector instructions.
@@ -272,5 +270,6 @@ def _block(u, place, a, b, blocks):
         u[52 * L + n] = az * yx + zz * ax + bz * hx + tz * bx
         u[53 * L + n] = az * yy + zz * ay + bz * hy + tz * by
         u[54 * L + n] = az * yz + zz * az + bz * hz + tz * bz
+    place = 9 * (a * (a + 1) // 2 + b)
     for i in range(9):
-        copy_lanes(u, 46 + i, blocks, 9 * place + i)
+        copy_lanes(u, 46 + i, blocks, place + i)

@@ -240,17 +240,15 @@ def _hessian(x, faces, Dm_inverse, areas, lam, mu, stress, slots, base, stride, 
             u[23 * L + n], u[24 * L + n] = px * px + qx * qx, py * px + qy * qx
             u[25 * L + n], u[26 * L + n] = py * py + qy * qy, pz * px + qz * qx
             u[27 * L + n], u[28 * L + n] = pz * py + qz * qy, pz * pz + qz * qz
-        place = 0
         for a in range(3):
             for c in range(a + 1):
-                _block(u, place, a, c, lam, mu, blocks)
-                place += 1
+                _block(u, a, c, lam, mu, blocks)
         for n in range(min(L, count - begin)):
             add_blocks(blocks, n, begin + n, 3, slots, base, stride, data)
 
 
 @njit(cache=True)
-def _block(u, place, a, c, lam, mu, blocks):
+def _block(u, a, c, lam, mu, blocks):
     """Write the blocks of corners a, c of the faces of u, as _hessian lays it out, into blocks."""
     # Only loops over rows that the compiler knows become vector instructions.
     L = LANES_FLOAT64
@@ -277,5 +275,6 @@ def _block(u, place, a, c, lam, mu, blocks):
         u[45 * L + n] = k * (az * cx) + m * (cz * ax) + b * u[26 * L + n]
         u[46 * L + n] = k * (az * cy) + m * (cz * ay) + b * u[27 * L + n]
         u[47 * L + n] = (k + m) * (az * cz) + b * u[28 * L + n] + s
+    place = 9 * (a * (a + 1) // 2 + c)
     for i in range(9):
-        copy_lanes(u, 39 + i, blocks, 9 * place + i)
+        copy_lanes(u, 39 + i, blocks, place + i)

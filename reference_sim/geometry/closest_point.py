@@ -53,37 +53,12 @@ def list_leaves(low, high, leaf_low, leaf_high, limit, masks):
 
 
 @njit(cache=True, error_model="numpy")
-def search(points, samples, everywhere, exact, mesh, pose, faces, barycentric, closest):
-    """Find the closest face of every sample at points (S, 3).
-
-    faces (S,) come in as hints and go out as answers. everywhere: the list of all leaves, for samples
-    without a face in their region.
-    """
-    missed = np.empty(len(points), np.int64)
-    set_boxes(samples.leaves, mesh, pose)
-    count = _search_groups(
-        samples.order, points, samples, exact, mesh, pose, faces, barycentric, closest, missed
-    )
-    if count > 0:
-        set_boxes(everywhere.leaves, mesh, pose)
-        corners = mesh.corners
-        fit_leaf(np.int64(0), mesh, pose)  # whoever asks for NaN gets its first face
-        some = missed[:count].copy()
-        for s in some:  # in loops: numpy's sum and rows take numba seconds
-            faces[s] = mesh.order[0]
-            for c in range(3):
-                total = corners[0, 0, c] + corners[0, 1, c] + corners[0, 2, c]
-                barycentric[s, c] = 1.0 / 3.0
-                closest[s, c] = total / 3.0
-        _search_groups(some, points, everywhere, exact, mesh, pose, faces, barycentric, closest, missed)
-
-
-@njit(cache=True, error_model="numpy")
-def _search_groups(some, points, samples, exact, mesh, pose, faces, barycentric, closest, missed):
+def search(some, points, samples, exact, mesh, pose, faces, barycentric, closest, missed):
     """Find the closest allowed faces of some samples (n,), LANES by LANES, from the hints in faces (S,) on.
 
     Writes who found none into missed (S,) and returns how many.
     """
+    set_boxes(samples.leaves, mesh, pose)
     # One long function: in three of them, for each group, the search took a tenth longer; in inlined ones,
     # each of whose arguments is counted again, up to ten times as long where few faces are allowed.
     # Out of their tuples once: each time that an array is taken from one, its references are counted.
@@ -313,10 +288,13 @@ class FaceSearch:
         barycentric, closest = np.empty((len(points), 3)), np.empty((len(points), 3))
         if samples is None:
             samples = self.listed(points)
-        search(
-            points, samples, self._everywhere, float(exact), self._mesh, self._pose, faces, barycentric,
-            closest,
-        )  # fmt: skip
+        missed, mesh = np.empty(len(points), np.int64), self._mesh
+        state = float(exact), mesh, self._pose, faces, barycentric, closest, missed
+        lost = missed[: search(samples.order, points, samples, *state)].copy()
+        if len(lost):  # whoever asks for NaN gets the first face
+            faces[lost], barycentric[lost] = mesh.order[0], 1.0 / 3.0
+            closest[lost] = self._pose.positions[mesh.vertices[0]].mean(axis=0)
+            search(lost, points, self._everywhere, *state)
         return Closest(faces, barycentric, closest)
 
 

@@ -82,7 +82,7 @@ def evaluate(u, target, vertices, terms, gradient, scratch, energies):
 def precondition(stiffening, factor):
     """Factorise the constant stiffness plus that which terms ((kernel, data), ...) have in this step."""
     values = factor.values
-    values[:] = factor.constant
+    copy(factor.constant, values)
     call_each(stiffening, np.empty(len(stiffening)), values)
     return factorise(
         values, factor.row_starts, factor.row_columns, factor.factor_rows, factor.factor_columns,
@@ -97,6 +97,13 @@ def dot(a, b):
     for i in range(len(a)):
         total += a[i] * b[i]
     return total
+
+
+@njit(cache=True)
+def copy(source, target):
+    """Copy n numbers: numba takes two seconds to compile an assignment to a slice."""
+    for i in range(len(target)):
+        target[i] = source[i]
 
 
 @njit(cache=True, fastmath=FAST)
@@ -136,7 +143,8 @@ def descend(
     most, held, newest = len(memory.rho), 0, -1
     alphas = np.empty(most, np.float32)
     while counts[0] < iterations and np.abs(gradient).max() > tolerance and np.isfinite(value):
-        p[:] = -gradient
+        for i in range(len(u)):
+            p[i] = -gradient[i]
         for back in range(held):
             k = (newest - back) % most
             alphas[k] = memory.rho[k] * dot(memory.S[k], p)
@@ -149,7 +157,7 @@ def descend(
         if counts[0] == 0:
             share = np.float32(first_step)
         for _ in range(HALVINGS if slope < 0 else 0):
-            trial[:] = u
+            copy(u, trial)
             add_scaled(trial, share, p)
             trial_value = evaluate(
                 trial, target, vertices, terms, trial_gradient, scratch, trial_energies
@@ -172,12 +180,12 @@ def descend(
         curvature = dot(p, gradient)
         if curvature > LEAST_CURVATURE * np.sqrt(dot(p, p) * dot(gradient, gradient)):
             newest, held = (newest + 1) % most, min(held + 1, most)
-            memory.S[newest] = p
-            memory.Y[newest] = gradient
+            copy(p, memory.S[newest])
+            copy(gradient, memory.Y[newest])
             memory.rho[newest] = np.float32(1.0) / curvature
-        u[:] = trial
-        gradient[:] = trial_gradient
-        energies[:] = trial_energies
+        copy(trial, u)
+        copy(trial_gradient, gradient)
+        copy(trial_energies, energies)
         value = trial_value
         counts[0] += 1
     return np.abs(gradient).max()
