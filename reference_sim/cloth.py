@@ -22,7 +22,7 @@ class Cloth:
     given; rest_positions then stays the starting shape.
 
     Raises MeshError that names the element: wrong shapes, NaN, zero-area face, coincident or unused
-    vertices, non-manifold edge, inconsistent winding, pin out of range.
+    vertices, seam left open, non-manifold edge, inconsistent winding, pin out of range.
 
     Example: a square of two triangles, held at one corner.
 
@@ -69,7 +69,8 @@ class Cloth:
             raise MeshError(
                 f"face {small[0]} has no rest area ({self.areas[small[0]]:.3g} m^2): remove it"
             )
-        _ = self._edge_table  # raises on non-manifold edges
+        edges, beside, _ = self._edge_table  # raises on non-manifold edges
+        _refuse_open_seams(positions, faces, np.unique(edges[(beside < 0).any(axis=1)]))
 
     @property
     def vertex_count(self) -> int:
@@ -204,6 +205,39 @@ def edge_table(faces: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.nda
         beside[np.flatnonzero(has), column] = halves // 3
         tips[np.flatnonzero(has), column] = opposite[halves]
     return edges, beside, tips
+
+
+# Of the lowest face at either: boundary vertices nearer than that are of a seam left open.
+OPEN_SEAM = 0.1
+
+
+def _refuse_open_seams(positions: np.ndarray, faces: np.ndarray, rim: np.ndarray) -> None:
+    """Raise MeshError where a mesh (V, 3) [m], (F, 3) has a seam whose sides lie close and are not joined.
+
+    rim: (R,) its boundary vertices. At such a seam two of them lie within `OPEN_SEAM`
+    heights of the faces at either. The sides of a narrow strip do not: its faces are as low.
+    """
+    from scipy.spatial import cKDTree
+
+    if not len(rim):
+        return
+    sides = positions[np.roll(faces, -1, axis=1)] - positions[faces]
+    doubled_areas = np.linalg.norm(np.cross(sides[:, 0], sides[:, 1]), axis=1)
+    face_heights = doubled_areas / np.linalg.norm(sides, axis=2).max(axis=1)
+    heights = np.full(len(positions), np.inf)
+    np.minimum.at(heights, faces, face_heights[:, None])
+    radius = OPEN_SEAM * heights[rim].max()
+    pairs = rim[cKDTree(positions[rim]).query_pairs(radius, output_type="ndarray")]
+    gaps = np.linalg.norm(np.diff(positions[pairs], axis=1)[:, 0], axis=1)
+    close = gaps < OPEN_SEAM * heights[pairs].min(axis=1)
+    if not close.any():
+        return
+    apart, gap = pairs[close], 1e3 * gaps[close].max()
+    place = ", ".join(f"{x:.3f}" for x in positions[apart.min()])
+    raise MeshError(
+        f"{len(np.unique(apart))} vertices of a seam lie up to {gap:.2g} mm apart, one at ({place}) m: merge "
+        f"vertices closer than {1.1 * gap:.2g} mm; where a slit is meant, open it wider"
+    )
 
 
 def check_mesh(positions: np.ndarray, faces: np.ndarray) -> None:

@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 from reference_sim.cloth import Cloth, MeshError
 from reference_sim.command_line import Parser, announce_compilation, command
 from reference_sim.files.mesh_files import read_mesh, read_sequence, refuse_too_many, to_metres_y_up
-from reference_sim.geometry.topology import refuse_open_seams
 from reference_sim.material import Material
 
 if TYPE_CHECKING:
@@ -110,9 +109,7 @@ def read_cloth(options: argparse.Namespace) -> Cloth:
     positions = to_metres_y_up(surface.positions, units=options.units, up=options.up)
     try:
         refuse_too_many(len(positions))
-        cloth = Cloth(positions, surface.faces, material, pins=choose_pins(options.pins, positions))
-        refuse_open_seams(positions, surface.faces)
-        return cloth
+        return Cloth(positions, surface.faces, material, pins=choose_pins(options.pins, positions))
     except MeshError as error:
         raise ValueError(f"{options.garment}: {error}") from None
 

@@ -10,8 +10,6 @@ from reference_sim.cloth import MeshError, edge_table
 Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
-OPEN_SEAM = 0.05  # mean boundary edges; boundary vertices nearer than that are of a seam left open
-
 
 def half_edges(faces: Index) -> Index:
     """Return the directed edges (3F,2) of faces (F,3), three for each face in turn, along its winding."""
@@ -42,32 +40,6 @@ def boundary_loops(faces: Index) -> list[Index]:
             after = following.pop(after)
         loops.append(np.array(loop, dtype=np.int64))
     return sorted(loops, key=lambda loop: (-len(loop), int(loop[0])))
-
-
-def refuse_open_seams(positions: Array, faces: Index) -> None:
-    """Raise MeshError where a mesh (V,3) [m], (F,3) has a seam whose sides lie close and are not joined.
-
-    At such a seam boundary vertices that no edge joins lie within `OPEN_SEAM` mean boundary edges.
-    """
-    from scipy.spatial import cKDTree
-
-    edges, beside, _ = edge_table(faces, len(positions))
-    rim = edges[(beside < 0).any(axis=1)]
-    if not len(rim):
-        return
-    length = np.linalg.norm(positions[rim[:, 0]] - positions[rim[:, 1]], axis=1).mean()
-    vertices = np.unique(rim)
-    pairs = cKDTree(positions[vertices]).query_pairs(OPEN_SEAM * length, output_type="ndarray")
-    pairs = np.sort(vertices[pairs], axis=1)
-    apart = pairs[~np.isin(pairs @ [len(positions), 1], edges @ [len(positions), 1])]
-    if not len(apart):
-        return
-    gap = 1e3 * np.linalg.norm(positions[apart[:, 0]] - positions[apart[:, 1]], axis=1).max()
-    place = ", ".join(f"{x:.3f}" for x in positions[apart.min()])
-    raise MeshError(
-        f"{len(np.unique(apart))} vertices of a seam lie up to {gap:.2g} mm apart, one at ({place}) m: merge "
-        f"vertices closer than {1.1 * gap:.2g} mm; where a slit is meant, open it wider"
-    )
 
 
 def corner_areas(corners: Array) -> Array:

@@ -76,9 +76,10 @@ class Garment:
 
     @property
     def hem(self) -> Index:
-        """Vertices (n,) of the hem, in order; of trousers those of both legs."""
-        if "hem" in self.loops:
-            return self.loops["hem"]
+        """Vertices (n,) of the hem, in order; of trousers those of both legs; else all that are free."""
+        if "hem" in self.loops or not self.loops.keys() >= LEGS:
+            free = np.setdiff1d(np.arange(len(self.rest_positions)), self.pins)
+            return self.loops.get("hem", free)
         return np.concatenate([self.loops["left_leg"], self.loops["right_leg"]])
 
     def pin_positions(
@@ -128,12 +129,11 @@ COVERED = 0.05  # share of a limb's skin within a garment, from which the garmen
 BELOW_HIPS = 0.1  # [m] below the hip joints, from where one tube around both legs follows neither
 
 
-def find_weights(body: Body, positions: Array, faces: Index, *, legs: bool) -> tuple[Array, Index]:
+def find_weights(body: Body, positions: Array, faces: Index) -> tuple[Array, Index]:
     """Return skinning weights (V,24) of a garment on the unposed body, and its nearest vertices (V,).
 
     They are blended from the three corners of the closest face of the skin, among the limbs that the
-    garment encloses. One tube around both legs, where neither leg has its own opening (`legs`), is
-    smoothed below the hips as a skirt is.
+    garment encloses. One tube around both legs is smoothed below the hips as a skirt is.
     """
     followed = skin_following(body, enclosed_limbs(body, positions, faces))
     skin = np.asarray(body.faces)[followed[body.faces].all(axis=1)]
@@ -143,8 +143,11 @@ def find_weights(body: Body, positions: Array, faces: Index, *, legs: bool) -> t
     corners = skin[closest.faces]
     nearest = corners[np.arange(len(corners)), closest.barycentric.argmax(axis=1)]
     weights = np.einsum("va,vaj->vj", closest.barycentric, body.skinning_weights[corners])
-    below = joint_position(body, "left_hip")[1] - positions[:, 1]
-    if not legs and below.max() > BELOW_HIPS:
+    hip, middle = joint_position(body, "left_hip")[1], joint_position(body, "pelvis")[0]
+    below = hip - positions[:, 1]
+    lowest = faces[(below[faces] > 0.5 * below.max()).all(axis=1)]
+    beside = positions[lowest, 0] > middle
+    if below.max() > BELOW_HIPS and (beside.any(axis=1) & ~beside.all(axis=1)).any():
         # As far as a template's skirt, whatever the size of the triangles.
         smooth = smooth_weights(weights, faces, round(SKIRT_SMOOTHING * len(positions) / 1000))
         share = np.clip(below / BELOW_HIPS, 0.0, 1.0)[:, None]
@@ -170,6 +173,7 @@ def enclosed_limbs(body: Body, positions: Array, faces: Index) -> tuple[str, ...
 ARMHOLE = 0.2  # share of the upper arm, beyond which an opening is a sleeve
 # share of a hip joint's distance from the middle, beyond which an opening is a sleeve or a leg
 MIDDLE = 0.5
+LEGS = {"left_leg", "right_leg"}
 ORDER = ("neck", "waist", "left_sleeve", "right_sleeve", "left_armhole", "right_armhole", "left_leg",
          "right_leg", "hem")  # fmt: skip
 
@@ -180,8 +184,9 @@ def name_openings(body: Body, positions: Array, faces: Index) -> dict[str, Index
     The garment (V,3) [m], (F,3) lies on the unposed body. An opening beside the middle is a leg below the
     hips and a sleeve above; a sleeve that ends near the shoulder's joint is an armhole. In the
     middle the highest is the neck, above half the way from pelvis to neck, or else the waist, and the
-    lowest the hem; one that is alone there is the hem, unless there are legs. The lowest of all is called
-    hem too where no other is, but for two legs. Others are opening_1 and so on.
+    lowest the hem; one that is alone there is the hem, unless there are legs or it is all above the
+    garment's mean height. The lowest of all is called hem too where no other is, but for two legs, waist
+    and neck. Others are opening_1 and so on.
 
     Raises:
         ValueError: loops touch.
@@ -203,12 +208,14 @@ def name_openings(body: Body, positions: Array, faces: Index) -> dict[str, Index
         middle.sort(key=lambda number: -heights[number])
         half_way = 0.5 * (joint_position(body, "pelvis")[1] + joint_position(body, "neck")[1])
         top = "neck" if heights[middle[0]] > half_way else "waist"
+        above = positions[loops[middle[0]], 1].min() > positions[faces, 1].mean()
         if len(middle) > 1:
             openings |= {top: middle[0], "hem": middle[-1]}
         else:
-            openings[top if openings.keys() & {"left_leg", "right_leg"} else "hem"] = middle[0]
-    if not {"left_leg", "right_leg"} <= openings.keys():
-        openings.setdefault("hem", int(np.argmin(heights)))
+            openings[top if above or openings.keys() & LEGS else "hem"] = middle[0]
+    lowest = int(np.argmin(heights))
+    if not openings.keys() >= LEGS and lowest not in (openings.get("waist"), openings.get("neck")):
+        openings.setdefault("hem", lowest)
     rest = (number for number in range(len(loops)) if number not in openings.values())
     named = {name: loops[openings[name]] for name in ORDER if name in openings}
     return named | {f"opening_{count}": loops[number] for count, number in enumerate(rest, start=1)}

@@ -20,7 +20,7 @@ from reference_sim.files.mesh_files import (
     rest_chart,
     to_metres_y_up,
 )
-from reference_sim.geometry.topology import Array, Index, refuse_open_seams
+from reference_sim.geometry.topology import Array, Index, corner_areas
 from reference_sim.material import Material
 from reference_sim.obstacle import Obstacle
 from snug.body.parametric_body import Body
@@ -35,15 +35,19 @@ from snug.garments.garment import (
 )
 from snug.garments.implicit_surface import skin_following
 
-TRAPPED_DEPTH = 0.02  # [m] below the skin, from which contact may not find the way out
+# [m] below the skin, from which contact may not find the way out
+TRAPPED_DEPTH = 0.02
 TRAPPED_SHARE = 0.05  # of the vertices that may be so deep
 MAX_DEPTH = 0.04  # [m], half the thickness of an arm
-WORN_DISTANCE = 0.05  # [m] from the skin: whatever is worn has a tenth of its vertices there
+# [m] from the skin: whatever is worn has a tenth of its vertices there
+WORN_DISTANCE = 0.05
 WORN_SHARE = 0.1
-SIZE_RANGE = 0.1, 1.2  # largest extent of a garment [heights of the body]
+# largest extent of a garment [heights of the body]
+SIZE_RANGE = 0.1, 1.2
 ENDS = ("head", "left_wrist", "right_wrist", "left_hand", "right_hand", "left_ankle", "right_ankle",
         "left_foot", "right_foot")  # fmt: skip
-OUTWARD = 0.5  # share of the area that looks away from the skin, below which a piece is inside out
+# share of the area that looks away from the skin, below which a piece is inside out
+OUTWARD = 0.5
 AREAL_DENSITIES = 0.005, 5.0  # [kg/m^2], lightest and heaviest cloth: beyond them a unit is mistaken
 
 
@@ -82,7 +86,7 @@ def _make_garment(file: GarmentFile, body: Body, raw: Surface, material: Materia
     positions = to_metres_y_up(raw.positions, units=file.units, up=file.up) + np.asarray(file.shift)
     surface, _ = join_seams(replace(raw, positions=positions))
     skin = Obstacle(body.template, body.faces)
-    _check_place(file, body, skin, raw.positions, surface.positions)
+    _check_place(file, body, skin, raw)
     chart = None
     if file.rest == "uv":
         chart = rest_chart(surface, METRES[file.units] if file.uv_scale is None else file.uv_scale)
@@ -92,12 +96,10 @@ def _make_garment(file: GarmentFile, body: Body, raw: Surface, material: Materia
         text = f"{material.areal_density:.3g} kg/m^2, {1e3 * material.thickness:.3g} mm thick"
         raise ValueError(f"its material is {text}: give thickness in m and density in kg/m^3")
     Cloth(positions, faces, rest_uv=chart)  # sheets that can be simulated, consistently wound
-    refuse_open_seams(positions, faces)
     loops = name_openings(body, positions, faces)
     if not loops:
         raise ValueError("it has no opening, the surface is closed: cut where head and limbs come out")
-    legs = "left_leg" in loops or "right_leg" in loops
-    weights, nearest = find_weights(body, positions, faces, legs=legs)
+    weights, nearest = find_weights(body, positions, faces)
     return Garment(
         name=file.name,
         rest_positions=positions,
@@ -111,27 +113,28 @@ def _make_garment(file: GarmentFile, body: Body, raw: Surface, material: Materia
     )
 
 
-def _check_place(file: GarmentFile, body: Body, skin: Obstacle, raw: Array, positions: Array) -> None:
-    """Raise ValueError unless the garment (V,3) [m] lies on the body; say which unit or axis mends it."""
-    distances = skin.signed_distance(positions, 0)
-    if not (problem := _misfit(body, skin, positions, distances)):
-        return
-    size = " x ".join(f"{length:.2f}" for length in np.ptp(positions, axis=0))
+def _check_place(file: GarmentFile, body: Body, skin: Obstacle, raw: Surface) -> None:
+    """Raise ValueError unless the garment lies on the body; say which unit or axis mends it."""
+    problem, size, fitting = "", "", {}
+    for units, up in sorted(product(METRES, UP_AXES), key=lambda axes: axes != (file.units, file.up)):
+        positions = to_metres_y_up(raw.positions, units=units, up=up) + np.asarray(file.shift)
+        distances = skin.signed_distance(positions, 0)
+        misfit = _misfit(body, skin, positions, raw.faces, distances)
+        if (units, up) == (file.units, file.up):
+            if not misfit:
+                return
+            problem, size = misfit, " x ".join(f"{length:.2f}" for length in np.ptp(positions, axis=0))
+        elif not misfit:
+            fitting[units, up] = np.abs(distances).mean()
     remedy = "move it onto the unposed body, facing +z with y up"
-    worn = {}
-    for units, up in product(METRES, UP_AXES):
-        moved = to_metres_y_up(raw, units=units, up=up) + np.asarray(file.shift)
-        distances = skin.signed_distance(moved, 0)
-        if not _misfit(body, skin, moved, distances):
-            worn[units, up] = np.abs(distances).mean()
-    if worn:
-        units, up = min(worn, key=worn.__getitem__)
+    if fitting:
+        units, up = min(fitting, key=fitting.__getitem__)
         remedy = f"give '{file.path.name},units={units},up={up}'"
     raise ValueError(f"does not lie on the body ({size} m, {problem}): {remedy}")
 
 
-def _misfit(body: Body, skin: Obstacle, positions: Array, distances: Array) -> str:
-    """Return why nothing can be simulated from a garment's place (V,3) [m] on the body, or empty.
+def _misfit(body: Body, skin: Obstacle, positions: Array, faces: Index, distances: Array) -> str:
+    """Return why nothing can be simulated from the place of a garment (V,3) [m], (F,3), or empty.
 
     distances: (V,) [m] of its vertices to the skin, negative below it.
     """
@@ -144,8 +147,10 @@ def _misfit(body: Body, skin: Obstacle, positions: Array, distances: Array) -> s
     if depth > MAX_DEPTH or np.mean(distances < -TRAPPED_DEPTH) > TRAPPED_SHARE:
         share = np.mean(distances < 0)
         return f"it lies up to {1e3 * depth:.0f} mm deep in the body, with {share:.0%} of it"
+    corners = positions[faces]
     at_ends = np.asarray(skin_following(body, ENDS)[body.faces].all(axis=1))
-    share = at_ends[skin.planes(positions, 0).faces].mean()
+    near = at_ends[skin.planes(corners.mean(axis=1), 0).faces]
+    share = np.average(near, weights=corner_areas(corners))
     return f"{share:.0%} of it lies around head, hands or feet" if share > 0.5 else ""
 
 

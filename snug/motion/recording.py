@@ -142,52 +142,108 @@ def are_positions(triples: np.ndarray) -> bool:
 
 # From the axes of a file, by the one that is vertical, to ours: with z up (x, y, z) becomes (x, z, -y).
 TO_Y_UP = {"y": np.eye(3), "z": np.array([[1.0, 0, 0], [0, 0, 1.0], [0, -1.0, 0]])}
-# between the vertical and the way from ankles to head: below it a body lies or crawls
+# Between the vertical and the way from ankles to head: below it a body lies or crawls.
 MAX_LYING_COSINE = 0.3
-MAX_RISE = 1.0  # [m] the lowest joint may rise and fall where no axis is given: more than a jump
+# Between trunk and legs of a person who is bent as far as one can be.
+MAX_FOLD_COSINE = -0.8
+# [m] by which the lowest joint rises, each second's lowest: a jump comes down again.
+MAX_RISE = 1.0
+# [m] across the body, which one that lies does not go; [rad/m] of one that rolls there.
+TRAVEL, ROLL = 1.0, 3.0
+# [m] between the floor and height 0, of a body that stands and of one that lies.
+FLOOR_ROOM, LYING_ROOM = 0.35, 0.1
+# [m] of a wrist, knee or foot above the lowest joint; a crawling pelvis is twice as high.
+ON_FLOOR = 0.15
+WRISTS = [JOINT[f"{side}_wrist"] for side in ("left", "right")]
+LEGS = [JOINT[f"{side}_{name}"] for name in ("knee", "foot") for side in ("left", "right")]
 
 
 def turn_y_up(motion: Motion, up: str) -> Motion:
     """Turn a motion in the axes of its file so that y is up.
 
-    In a frame the body stands along the axis that is nearest to the direction from its ankles to its
-    head. The axis of more than half of the frames is taken; a body that lies in the others, as after a
-    fall, is fine. A given axis `up`, "y" or "z", is taken if the body stands along it.
+    In a frame the body points along the axis that is nearest to the direction from its ankles to its
+    head. The axis of more than half of the frames is taken, if the body stands along it on its feet; one
+    that lies in the others, as after a fall, is fine. A given axis `up`, "y" or "z", is taken whether the
+    body stands, crawls or lies.
 
     Raises:
-        MotionError: no axis is that, the given one is not, the trunk hangs head down, or a body that
-            should stand along the axis found travels along it: it may be crawling.
+        MotionError: no axis is that, or the body may lie along it; the body walks along another axis than
+            the given one, or hangs from it head down; the trunk is folded on the legs.
     """
     joints = joint_positions(motion.poses, motion.translations)
     ankles = joints[:, [JOINT["left_ankle"], JOINT["right_ankle"]]].mean(axis=1)
-    directions = joints[:, JOINT["head"]] - ankles
-    directions /= np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-9)
+    trunk, legs = joints[:, JOINT["head"]] - joints[:, 0], joints[:, 0] - ankles
+    directions = (trunk + legs) / np.maximum(np.linalg.norm(trunk + legs, axis=1, keepdims=True), 1e-9)
     nearest = np.concatenate([directions, -directions], axis=1).argmax(axis=1)
     shares = {axis: np.mean(nearest == "xyz".index(axis)) for axis in TO_Y_UP}
     axis = up or max(shares, key=lambda axis: shares[axis])
-    share = f"{100 * shares[axis]:.0f} % of the frames"
-    along = "xyz".index(axis)
-    stands = (directions[:, along] > MAX_LYING_COSINE).mean() if up else shares[axis]
-    if stands <= 0.5:
+    share, along = f"{100 * shares[axis]:.0f} % of the frames", "xyz".index(axis)
+    pointed = int(np.bincount(nearest % 3).argmax())
+    heights = joints[..., along]
+    hangs = heights[:, WRISTS].min(axis=1) > heights[:, JOINT["head"]]
+    hangs &= directions[:, along] < -MAX_LYING_COSINE
+    walks = pointed != along and (nearest % 3 == pointed).mean() > 0.5 and _walks(motion, pointed)
+    if hangs.mean() > 0.5 or walks or (not up and shares[axis] <= 0.5):
         raise MotionError(
             f"the body stands along {axis} in {share} only; add ,up=y or ,up=z behind the path, "
             "turn the root's rotation and path, or give a clip that stands"
         )
-    trunk = joints[:, JOINT["head"]] - joints[:, JOINT["pelvis"]]
-    leans = trunk[:, along] / np.linalg.norm(trunk, axis=1)
-    if (low := np.mean(leans < (-MAX_LYING_COSINE if up else 0.0))) > 0.5:
+    folds = np.einsum("ti,ti->t", trunk, legs) / np.linalg.norm(trunk, axis=1)
+    folds /= np.maximum(np.linalg.norm(legs, axis=1), 1e-9)
+    if (low := np.mean(folds < (MAX_FOLD_COSINE if up else -MAX_LYING_COSINE))) > 0.5:
         raise MotionError(
             f"the head is not above the pelvis in {100 * low:.0f} % of the frames; export it with a T pose "
             "at rest and rotations relative to the parent joint, or give a clip that stands"
         )
-    rise = float(np.ptp(joints[..., along].min(axis=1)))
-    if not up and rise > MAX_RISE:
+    if not up and (doubt := _doubt(motion, joints, along)):
         raise MotionError(
-            f"the body points along {axis} in {share}, and its lowest joint moves by {rise:.3g} m along it; "
-            f"if {axis} is up and the path in metres add ,up={axis}"
+            f"the body points along {axis} in {share}, but {doubt}: it may lie or crawl; "
+            "add ,up=y or ,up=z behind the path"
         )
     note = f"{up} up as given" if up else f"{axis} up, as the body stands in {share}"
     poses, turn = motion.poses.copy(), TO_Y_UP[axis]
     poses[:, 0] = axis_angles(turn @ rotation_matrices(poses[:, 0]))
     translations = motion.translations @ turn.T
     return replace(motion, poses=poses, translations=translations, source=f"{motion.source}; {note}")
+
+
+def _walks(motion: Motion, along: int) -> bool:
+    """Return whether a body that points along that axis travels across it, and does not roll."""
+    across = [(along + 1) % 3, (along + 2) % 3]
+    path = motion.translations[:, across]
+    travel = float(np.linalg.norm(path - path[0], axis=1).max())
+    facing = rotation_matrices(motion.poses[:, 0])[:, across, 2]
+    turned = np.ptp(np.unwrap(np.arctan2(facing[:, 1], facing[:, 0])))
+    return travel > TRAVEL and turned < ROLL * travel
+
+
+def _doubt(motion: Motion, joints: np.ndarray, along: int) -> str:
+    """Return why a body that points along that axis may not stand along it, or empty.
+
+    joints: (T, 24, 3) [m]. Heights are of the file, whose floor is at 0, or of the root where one that
+    stands has 0.
+    """
+    from scipy.ndimage import minimum_filter1d  # slow to load; names are listed without
+
+    heights = joints - joints.min(axis=1, keepdims=True)
+    floors = motion.translations - heights[:, 0]
+    lows = minimum_filter1d(floors[:, along], max(1, round(motion.fps)), mode="nearest")
+    if (rise := float(np.ptp(lows))) > MAX_RISE:
+        return f"its lowest joint moves by {rise:.3g} m along it"
+    floor = np.median(floors, axis=0)
+    offs = np.minimum(np.abs(floors), np.abs(floors + REST_JOINTS[0, 1]))
+    walks = _walks(motion, along)
+    for other in {1, 2} - {along}:
+        near = heights[..., other] < ON_FLOOR
+        crawls = near[:, WRISTS].all(axis=1)
+        crawls &= near[:, LEGS].any(axis=1)
+        crawls &= heights[:, 0, other] > 2 * ON_FLOOR
+        if crawls.mean() > 0.5:
+            return "wrists and feet, or knees, are on one level beside it"
+        flat = np.quantile(offs[:, other], 0.9) < LYING_ROOM
+        raised = abs(np.median(motion.translations[:, other])) > LYING_ROOM / 2
+        if flat and raised and not walks and abs(floor[along]) > FLOOR_ROOM:
+            return f"lies at height 0 along {'xyz'[other]}"
+    if np.median(offs[:, along]) > FLOOR_ROOM and not walks:
+        return f"stays in place with its feet at {floor[along]:.3g} m, not on a floor at 0"
+    return ""

@@ -56,6 +56,17 @@ REFUSED = [
 ]
 
 
+@pytest.mark.parametrize("gap", [1e-9, 1e-6, 1e-5, 1e-3])
+def test_a_seam_left_open_is_refused_and_a_slit_or_a_narrow_strip_is_not(gap):
+    x = 0.1 * np.array([(0, 0, 0), (1, 0, 0), (1, 0, 1), (0, 0, 1)])
+    pair, faces = np.concatenate([x, x]), np.array([(0, 2, 1), (0, 3, 2), (4, 6, 5), (4, 7, 6)])
+    right = (np.arange(8) >= 4)[:, None] * [1.0, 0.0, 0.0]
+    with pytest.raises(MeshError, match=f"4 vertices of a seam lie up to {1e3 * gap:.2g} mm apart"):
+        Cloth(pair + (0.1 + gap) * right, faces)
+    Cloth(pair + 0.12 * right, faces)
+    Cloth((x * [gap, 1.0, 1.0]), faces[:2])
+
+
 @pytest.mark.parametrize(("what", "x", "faces", "more", "message"), REFUSED)
 def test_a_mesh_that_cannot_be_simulated_is_refused_by_name(what, x, faces, more, message):
     with pytest.raises(ValueError, match=re.escape(message)) as refused:  # as callers catch it

@@ -13,7 +13,6 @@ from reference_sim import Trajectory
 from reference_sim.files import mesh_files
 from reference_sim.trajectory import write_obj
 from tests.reference_sim.meshes import grid, sphere
-from tests.snug.garments.garment_files import doubled_along
 
 SHEET, FACES = grid(6, 6, width=0.4, depth=0.4)
 SHEET -= SHEET.mean(axis=0)
@@ -25,10 +24,6 @@ def simulate(tmp_path, monkeypatch):
     """Return a function of the command's words; a sheet and a ball of 3 frames below it lie in the folder."""
     monkeypatch.chdir(tmp_path)
     write_obj(tmp_path / "sheet.obj", SHEET, FACES)
-    middle = np.flatnonzero(np.abs(SHEET[:, 0]) < 1e-9)
-    positions, faces = doubled_along(SHEET, FACES, middle)
-    positions[len(SHEET) :, 0] -= 1e-9
-    write_obj(tmp_path / "seam.obj", positions, faces)
     write_obj(tmp_path / "sheet_cm.obj", 100 * SHEET[:, [0, 2, 1]] * [1, -1, 1], FACES)
     for frame in range(3):
         write_obj(
@@ -73,7 +68,6 @@ def test_pins_ride_on_an_obstacle_that_moves_below_them_and_stay_elsewhere(simul
         ("sheet.obj --pins 49 -o a.vtkhdf", "--pins '49': give 'top', or vertices from 0 to 48 as '0,9'"),
         ("sheet.obj -o a.obj", "a.obj: name a new file that ends in .vtkhdf, in a folder that exists"),
         ("sheet.obj --obstacle ball --obstacle-rest sheet.obj -o a.vtkhdf", "export both from one mesh"),
-        ("seam.obj -o a.vtkhdf", "seam.obj: 14 vertices of a seam lie up to 1e-06 mm apart"),
         ("sheet.obj --obstacle sheet.obj -o a.vtkhdf", "sheet.obj: obstacle is not closed"),
     ],
 )  # fmt: skip

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import igl
 import numpy as np
 import pytest
 
@@ -17,6 +18,7 @@ from snug import train as train_command
 from snug.body.skeleton import JOINT
 from snug.file_options import GarmentFile, parse_garment_file
 from snug.garments.garment import GarmentError, name_openings
+from snug.garments.implicit_surface import skin_following
 from snug.garments.reading import read_garment
 from snug.networks.dressed_body import DressedBody
 from tests.snug.garments.garment_files import doubled_along, own_chart, saved, z_up
@@ -102,17 +104,37 @@ def test_a_skirt_is_held_by_its_waist_and_follows_neither_leg(tmp_path, body):
     assert np.abs(left - right).max() < 0.2 and min(left.min(), right.min()) > 0.2
 
 
+def capped(garment, *names):
+    """Faces of a garment with a fan over each of these openings."""
+    loops = [garment.loops[name] for name in names]
+    fans = [np.stack([np.full(len(loop) - 2, loop[0]), loop[2:], loop[1:-1]], axis=1) for loop in loops]
+    return np.concatenate([garment.faces, *fans])
+
+
 def test_legs_apart_are_no_sleeves_and_what_has_no_waist_does_not_hang(tmp_path, body):
     trousers = tailored("trousers", 300)
     x, y, z = trousers.rest_positions.T
     apart = np.stack([x + 0.6 * np.sign(x) * np.maximum(0.88 - y, 0.0), y, z], axis=1)
     assert set(name_openings(body, apart, trousers.faces)) == {"waist", "left_leg", "right_leg"}
-    waist = trousers.loops["waist"]
-    first = np.full(len(waist) - 2, waist[0])
-    closed = np.concatenate([trousers.faces, np.stack([first, waist[2:], waist[1:-1]], axis=1)])
-    path = saved(tmp_path, trousers, faces=closed)
+    path = saved(tmp_path, trousers, faces=capped(trousers, "waist"))
     with pytest.raises(GarmentError, match=r"no waist among its openings \(left_leg, right_leg\)"):
         read_garment(path, body)
+
+
+def test_tights_hang_from_their_waist_and_mittens_are_no_opening(tmp_path, body, shirt):
+    """Tights are the skin below 1 m, arms left out, moved out by 8 mm."""
+    arms = skin_following(body, ["left_wrist", "right_wrist", "left_hand", "right_hand"])
+    kept = body.faces[((body.template[:, 1] < 1.0) & ~arms)[body.faces].all(axis=1)]
+    used, faces = np.unique(kept, return_inverse=True)
+    skin = body.template + 0.008 * igl.per_vertex_normals(body.template, np.asarray(body.faces))
+    path = saved(tmp_path, shirt, positions=skin[used], faces=faces.reshape(-1, 3))
+    tights = read_garment(path, body)
+    assert set(tights.loops) == {"waist"} and not set(tights.hem) & set(tights.pins)
+    np.testing.assert_array_equal(tights.pins, np.sort(tights.loops["waist"]))
+    left = tights.rest_positions[:, 0] > 0.05
+    assert tights.skinning_weights[left][:, JOINT["right_knee"]].max() < 0.01
+    mittens = saved(tmp_path, shirt, faces=capped(shirt, "left_sleeve", "right_sleeve"))
+    assert list(read_garment(mittens, body).loops) == ["neck", "hem"]
 
 
 def test_each_piece_of_an_outfit_is_held_by_itself(tmp_path, body, shirt):

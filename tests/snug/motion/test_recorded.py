@@ -5,14 +5,13 @@ import hashlib
 import numpy as np
 import pytest
 
-from snug.body.skeleton import rotation_matrices, sole_points
+from snug.body.skeleton import sole_points
 from snug.motion.library import (
     CLIPS,
     CONTROL,
     DYNAMIC_TEST,
     DYNAMIC_VALIDATION,
     LIBRARY,
-    SEGMENTS,
     TEST,
     TRAIN,
     VALIDATION,
@@ -24,7 +23,6 @@ from snug.motion.recording import MAX_TURN_SPEED, check_recording
 from tests.snug.motion.motion_forms import joint_speeds
 
 TURN_LIMIT = 30.0  # [rad/s] the notice's: half of what is let pass in a user's file
-MEASURED = [name for name in (*VALIDATION, *TEST) if clip_of(name) in CLIPS]
 
 
 @pytest.fixture(scope="module")
@@ -65,18 +63,3 @@ def test_a_clip_is_a_person_on_the_floor_without_recording_errors(name, clips):
     assert abs(np.percentile(lowest, 2.0)) < 1e-6
     assert (arm_clearance(motion).min(axis=1) > np.radians(25.0)).mean() >= 0.95
     np.testing.assert_allclose(motion.translations[0, [0, 2]], 0.0, atol=1e-6)
-
-
-@pytest.mark.parametrize("name", MEASURED)
-def test_a_segment_starts_at_the_origin_facing_forward_on_the_clips_floor(name, clips):
-    motion, clip = make_motion(name), clips[clip_of(name)]
-    _, start, stop = SEGMENTS.get(name, (name, 0, clip.frames))
-    assert motion.name == name and motion.frames == stop - start
-    np.testing.assert_allclose(motion.translations[0, [0, 2]], 0.0, atol=1e-6)
-    np.testing.assert_allclose(motion.translations[:, 1], clip.translations[start:stop, 1], atol=1e-12)
-    assert rotation_matrices(motion.poses[0, 0])[0, 2] == pytest.approx(0.0, abs=1e-6)
-    np.testing.assert_array_equal(motion.poses[:, 1:], clip.poses[start:stop, 1:])
-    steps = [
-        np.linalg.norm(np.diff(m.translations, axis=0), axis=1) for m in (motion, clip.cut(start, stop))
-    ]
-    np.testing.assert_allclose(*steps, atol=1e-12)

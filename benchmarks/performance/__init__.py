@@ -1,1 +1,0 @@
-"""Folder that asv reads (asv.conf.json): microbenchmarks.py."""
