@@ -15,7 +15,6 @@ import numpy as np
 from reference_sim.cloth import MeshError
 from reference_sim.geometry.closest_point import Closest, FaceSearch, Listed
 from reference_sim.geometry.surface import (
-    TANGENT_BALL,
     carry,
     faces_around,
     plane_normals,
@@ -181,37 +180,19 @@ class Obstacle:
         closest = self._nearest(points, frame, rest_points)
         vertices = self.at(frame)
         normals = np.empty_like(closest.points)
-        plane_normals(
+        tilted = plane_normals(
             points, closest.points, closest.faces, closest.barycentric, vertices, self.faces,
             *self._around, normals,
         )  # fmt: skip
-        if margin is not None:
-            self._turn_from_free(points, vertices, closest, normals, margin)
+        if margin is not None and len(tilted):
+            some = points[tilted]
+            assert self._search is not None
+            nearest = self._search.nearest(some, hints=closest.faces[tilted]).points
+            free = np.linalg.norm(some - nearest, axis=1) > margin
+            free[free] = winding_numbers(vertices, self.faces, some[free]) <= 0
+            offsets = (some - closest.points[tilted])[free]
+            normals[tilted[free]] = offsets / np.linalg.norm(offsets, axis=1)[:, None]
         return Planes(closest.points, normals, closest.faces, closest.barycentric)
-
-    def _turn_from_free(
-        self,
-        points: np.ndarray,
-        vertices: np.ndarray,
-        closest: Closest,
-        normals: np.ndarray,
-        margin: float,
-    ) -> None:
-        """Turn the normals (S, 3) of planes that touch free points (S, 3) [m]; see `planes`."""
-        offsets = points - closest.points
-        distances = np.linalg.norm(offsets, axis=1)
-        heights = np.einsum("si,si->s", normals, offsets)
-        # Tilted planes too, which would be met within the step.
-        doubtful = np.flatnonzero((distances > TANGENT_BALL) & (heights < 0.99 * distances))
-        if len(doubtful) == 0:
-            return
-        assert self._search is not None
-        some = points[doubtful]
-        nearest = self._search.nearest(some, hints=closest.faces[doubtful]).points
-        free = np.linalg.norm(some - nearest, axis=1) > margin
-        free[free] = winding_numbers(vertices, self.faces, some[free]) <= 0
-        turned = doubtful[free]
-        normals[turned] = offsets[turned] / distances[turned, None]
 
     def transported(
         self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None

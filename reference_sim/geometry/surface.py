@@ -100,12 +100,15 @@ def _beyond(offset, c, face, weights, vertices, faces, starts, around):
 def plane_normals(points, closest, closest_faces, barycentric, vertices, faces, starts, around, normals):
     """Write the normals (S, 3) from the closest points to the samples, turned outwards.
 
+    Returns the samples farther away than TANGENT_BALL whose plane is nearer.
+
     A sample that looks along the surface, or is below it and beyond the border of the faces that it may
     meet (another face at the closest point c leads nearer), meets a ball that touches the surface in c
     from below: the normal points to the sample from the ball's point opposite to c. starts, around: see
     `faces_around`.
     """
     of_vertices = normals_of_corners(closest_faces, vertices, faces, starts, around)
+    tilted, count = np.empty(len(points), np.int64), 0
     for s in range(len(points)):
         i, j, k = faces[closest_faces[s], 0], faces[closest_faces[s], 1], faces[closest_faces[s], 2]
         u, v, w = barycentric[s, 0], barycentric[s, 1], barycentric[s, 2]
@@ -116,7 +119,7 @@ def plane_normals(points, closest, closest_faces, barycentric, vertices, faces, 
         x, y, z, length = _unit(
             points[s, 0] - closest[s, 0], points[s, 1] - closest[s, 1], points[s, 2] - closest[s, 2]
         )
-        cosine = x * m0 + y * m1 + z * m2
+        cosine, o0, o1, o2 = x * m0 + y * m1 + z * m2, x, y, z
         # Within a micrometre, or looking along the surface, the offset has no direction to trust.
         beside = not (length > 1e-6 and np.abs(cosine) > 0.3)
         if cosine < -0.3 and min(u, v, w) <= ON_SIDE:
@@ -133,7 +136,13 @@ def plane_normals(points, closest, closest_faces, barycentric, vertices, faces, 
                 n = cross_of_face(vertices, i, j, k)
                 side = np.sign(n[0] * x + n[1] * y + n[2] * z)
                 x, y, z, _ = _unit(side * n[0], side * n[1], side * n[2])
-        normals[s, 0], normals[s, 1], normals[s, 2] = outwards * x, outwards * y, outwards * z
+        x, y, z = outwards * x, outwards * y, outwards * z
+        normals[s, 0], normals[s, 1], normals[s, 2] = x, y, z
+        # Also by little: it would be met within the step.
+        if length > TANGENT_BALL and x * o0 + y * o1 + z * o2 < 0.99:
+            tilted[count] = s
+            count += 1
+    return tilted[:count]
 
 
 @njit(cache=True, error_model="numpy")
