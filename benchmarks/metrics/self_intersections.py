@@ -45,7 +45,6 @@ def _sweep(x, faces, low, high, order, hit):
                 continue
             if _neighbours(faces[e], faces[f]):
                 continue
-            # Of a literal numba compiles a function anew.
             crossings = _crossings(x, faces[e], faces[f], ends, np.int64(0))
             crossings = _crossings(x, faces[f], faces[e], ends, crossings)
             if crossings > 0:

@@ -113,19 +113,13 @@ def _from_rest(theta, rest):
     return theta - 2 * np.pi * np.floor((theta + np.pi) / (2 * np.pi))
 
 
-@njit(cache=True, error_model="numpy")
-def dihedral_angles(x, hinges):
-    """(H,) signed dihedral angles [rad] of positions x (V, 3); 0 is flat."""
-    angles, e, r, s = np.empty(len(hinges)), np.empty(3), np.empty(3), np.empty(3)
-    for h in range(len(hinges)):
-        for i in range(3):
-            e[i] = x[hinges[h, 1], i] - x[hinges[h, 0], i]
-            r[i] = x[hinges[h, 2], i] - x[hinges[h, 0], i]
-            s[i] = x[hinges[h, 3], i] - x[hinges[h, 0], i]
-        a, b = np.cross(e, r), np.cross(s, e)
-        sine = np.sum(np.cross(a, b) * e) / np.sqrt(np.sum(e * e))
-        angles[h] = np.arctan2(sine, np.sum(a * b))
-    return angles
+def dihedral_angles(x: np.ndarray, hinges: np.ndarray) -> np.ndarray:
+    """Return signed dihedral angles (H,) [rad] of positions x (V, 3) [m]; 0 is flat."""
+    first, e, r, s = x[hinges.T]
+    e, r, s = e - first, r - first, s - first
+    a, b = np.cross(e, r), np.cross(s, e)
+    sine = (np.cross(a, b) * e).sum(axis=1) / np.sqrt((e * e).sum(axis=1))
+    return np.arctan2(sine, (a * b).sum(axis=1))
 
 
 @njit(cache=True, error_model="numpy")

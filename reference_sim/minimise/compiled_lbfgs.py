@@ -289,18 +289,16 @@ NOTHING: Any = SimpleNamespace(  # a term of any of these kinds, without element
 
 
 def _with_common(kernels: tuple[Float32Lanes, ...]) -> tuple[list[Float32Lanes], list[int]]:
-    """Return the kernels of terms and those of the common kinds that are absent, without elements.
+    """Return the kernels of terms beside empty ones of the common kinds that are absent; places of terms.
 
-    So `descend` is compiled once for all cloths of these kinds. Returns the places of the terms, too.
+    So `descend` is compiled once for all cloths of these kinds.
     """
-    common = [lanes(NOTHING) for lanes in COMMON]
-    known = [lanes.gradient for lanes in common]
-    places = [known.index(lanes.gradient) for lanes in kernels if lanes.gradient in known]
-    if len(places) < len(kernels) or places != sorted(set(places)):
-        return list(kernels), list(range(len(kernels)))
-    for place, lanes in zip(places, kernels):
-        common[place] = lanes
-    return common, places
+    kinds = [lanes.gradient for lanes in kernels]
+    if len(set(kinds)) < len(kinds):
+        return list(kernels), list(range(len(kinds)))
+    common = {lanes.gradient: lanes for lanes in (of(NOTHING) for of in COMMON)}
+    common |= dict(zip(kinds, kernels))
+    return list(common.values()), [list(common).index(kind) for kind in kinds]
 
 
 def _factor(cloth: Cloth, terms: StepTerms, lanes: list[Float32Lanes]) -> tuple[Any, list[tuple]]:
