@@ -13,7 +13,7 @@ from pathlib import Path
 
 from benchmarks.declarations import DeclarationError
 from benchmarks.external.roll_out_files import RollOutFileError
-from benchmarks.plan.options import PROGRAM, list_names, make_parser, refuse_former, study_of
+from benchmarks.plan.options import PROGRAM, list_names, make_parser, study_of
 from benchmarks.plan.plan import Plan, make_plan
 from benchmarks.plan.study import StudyError, located
 from benchmarks.runner.task import RunRefused, RunStopped
@@ -26,12 +26,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     asked = "default"
     one_thread()
     try:
-        refuse_former(command_line)
         options = make_parser().parse_args(command_line)
         asked = options.study
         study = study_of(options, asked)
-        if options.list:
-            print(list_names(study))
+        if options.list is not None:
+            print(list_names(study, options.list))
             return 0
         plan = make_plan(
             study,

@@ -6,15 +6,27 @@ Light, so that --help answers at once.
 from __future__ import annotations
 
 import argparse
+from collections import Counter
 from collections.abc import Iterator, Sequence
-from dataclasses import fields
+from fnmatch import fnmatchcase
+from re import split
+from textwrap import fill, indent, shorten
 from typing import Any
 
 from benchmarks.declarations import attributes_of
 from benchmarks.external.roll_out_files import parse_roll_out
 from benchmarks.plan.choose_cells import matching, scenes_of_parts
 from benchmarks.plan.plan import read_files
-from benchmarks.plan.study import Study, StudyError, Table, option, parse_setting, read_study, study_names
+from benchmarks.plan.study import (
+    Study,
+    StudyError,
+    Table,
+    nearest,
+    option,
+    parse_setting,
+    read_study,
+    study_names,
+)
 from benchmarks.presets import PRESETS
 from reference_sim.command_line import Parser
 from snug.file_options import split_words
@@ -23,13 +35,11 @@ PROGRAM = "benchmarks.run"
 EXAMPLES = """examples:
   python -m benchmarks.run                                    study default: all of it, small
   python -m benchmarks.run full                               more motions, trainings, solvers and scenes
-  python -m benchmarks.run full --trained                     the same with the networks of the package
   python -m benchmarks.run smoke                              everything once, tiny, about 2 minutes
   python -m benchmarks.run full:garments -o reports/runs/mine       one part of a study
   python -m benchmarks.run ./mine.toml --set sizes.frames=60        a study of your own (docs/run.md)
   python -m benchmarks.run --scenes 'tshirt/*' --methods ./mine.py,snug,simulation --seeds 0,1,2
   python -m benchmarks.run --motions mocap.bvh,up=z --garment shirt.obj,units=cm --body mine.npz
-  python -m benchmarks.run --scenes tshirt/kick --methods simulation,skinning --rollout mine=out.npz,ms=2.2
 
 a folder that holds a run, also one that was killed, is gone on with: what is finished there for the same
   inputs and code is taken as it is. --retry does again what failed, --fresh everything.
@@ -43,25 +53,7 @@ SHORT = {  # field -> its placeholder in help; those of a scene first
 }  # fmt: skip
 OF_SCENES = tuple(SHORT)[:4]
 SINGLE = ("body", "garment", "trained")  # given once
-BEHIND_A_PATH = "units up fps other-mesh motion-up motion-fps garment-units garment-up"
-REPLACED = {  # former option, which people have in scripts -> what to say in its place
-    **{
-        f"--{f.name.replace('_', '-')}": f"--set {f.name}=..."
-        for f in fields(Study)
-        if f.name not in SHORT
-    },
-    **{f"--{name}": "say it behind the path: FILE,units=cm" for name in BEHIND_A_PATH.split()},
-    "--preset": "name a study (smoke, paper), or --set sizes=NAME",
-    "--suite": "name parts of a study: python -m benchmarks.run full:NAME",
-    "--frames": "--set sizes.frames=N",
-}
-
-
-def refuse_former(words: Sequence[str]) -> None:
-    """Raise StudyError for a former option among the words of a command line."""
-    for word in (word.partition("=")[0] for word in words):
-        if remedy := REPLACED.get(word):
-            raise StudyError(f"{word} is no option any more: {remedy}")
+LONG, COLUMNS = 18, 110  # an overview has at most so many names of a section
 
 
 def make_parser() -> argparse.ArgumentParser:
@@ -86,7 +78,9 @@ def make_parser() -> argparse.ArgumentParser:
     add("--scheduler", metavar="ADDRESS",
         help="a cluster of dask.distributed, as tcp://HOST:8786, for work that is not timed; timed methods "
         "run here (docs/scale.md)")  # fmt: skip
-    add("--list", action="store_true", help="list studies, scenes, methods and motions; run nothing")
+    add("--list", nargs="?", const="", metavar="WORD",
+        help="list studies, scenes, methods and motions with this word in their names; without a word, an "
+        "overview; run nothing")  # fmt: skip
     add("--dry-run", action="store_true", help="say what would be run and what is cached; write nothing")
     return parser
 
@@ -134,12 +128,34 @@ def _tables(options: argparse.Namespace) -> Iterator[Table]:
         yield option(field, value)
 
 
-def list_names(study: Study) -> str:
-    """Return studies, scenes, methods, motions, sizes and known answers, one line each.
+def list_names(study: Study, word: str = "") -> str:
+    """Return what can be named, a line each: all with `word` in their names, else an overview of a screen.
 
     Every scene and method can be named in every study. Those that take part without being named are those
-    of the given study.
+    of the given study. A word may be a pattern. Raises StudyError where no name has it.
     """
+    lines, sections = [], _sections(study)
+    for title, rows in sections.items():
+        named = {name: text for name, text in rows.items() if fnmatchcase(name, f"*{word}*")}
+        width = max(map(len, named), default=0)
+        lines += [title] if named else []
+        if word or (len(named) < LONG and any(named.values())):
+            room = 1000 if word else COLUMNS
+            for name, text in named.items():
+                lines.append(f"  {name:<{width}}  {shorten(text, room, placeholder=' ...')}".rstrip())
+        else:
+            families = Counter(split("[-+/_]", name)[0] for name in named).most_common()
+            texts = [f"{name}* ({count})" for name, count in families[:LONG]]
+            texts += [f"{len(families) - LONG} more"] * (len(families) > LONG)
+            lines.append(indent(fill(", ".join(texts), COLUMNS), "  "))
+    if not lines:
+        names = [name for rows in sections.values() for name in rows]
+        raise StudyError(f"--list {word}: {nearest(word, names, 'no name has it; see --list')}")
+    return "\n".join(lines if word else [*lines, "Each by its name: --list WORD"])
+
+
+def _sections(study: Study) -> dict[str, dict[str, str]]:
+    """Return title -> name -> text of what can be named."""
     read = read_files(study)
     motions, parts = read.motions, study.parts
     clip = f"{motions.worn[0].garment}/{motions.measured[0]}@clip"
@@ -153,7 +169,7 @@ def list_names(study: Study) -> str:
         known = ", ".join(part for part in parts if matching([name], parts[part].methods))
         methods[name] = f"{entry.description} [{known or 'when named'}]"
     listed = {part: ", ".join(names) for part, names in scenes_of_parts(read).items() if names}
-    sections: dict[str, dict[str, str]] = {
+    return {
         "studies": {name: read_study(name).question for name in study_names()},
         "parts of this study": {name: part.question for name, part in parts.items()},
         "scenes of each part where none is named": listed,
@@ -163,8 +179,3 @@ def list_names(study: Study) -> str:
         "sizes": {preset.name: preset.description for preset in PRESETS},
         "known answers": {case.name: f"{case.description} [{case.suite}]" for case in read.cases},
     }
-    lines = []
-    for title, rows in sections.items():
-        width = max(map(len, rows), default=0)
-        lines += ["", title, *(f"  {name:<{width}}  {text}".rstrip() for name, text in rows.items())]
-    return "\n".join(lines[1:])

@@ -33,15 +33,6 @@ if TYPE_CHECKING:
 MOST_FAILURES = 8  # that the end of a run names; its files have all
 
 
-def summary(rows: Sequence[Row]) -> str:
-    """Return one line of how many rows of each suite have which status."""
-    last = []
-    for suite in dict.fromkeys(row.suite for row in rows):
-        statuses = Counter(row.status for row in rows if row.suite == suite)
-        last.append(f"{suite}: " + ", ".join(f"{count} {status}" for status, count in statuses.items()))
-    return "; ".join(last)
-
-
 def execute(plan: Plan, assets: Assets | None = None) -> int:
     """Run the plan, with its assets where they have been made; then make its report.
 
@@ -70,7 +61,7 @@ def execute(plan: Plan, assets: Assets | None = None) -> int:
     log.write_rows(rows)
     log.note_outcomes(runner)
     answer = make_report(log)
-    print(*filter(None, (answer, summary(log.rows))), sep="\n", flush=True)
+    print(answer or "", flush=True)
     failed = [row for row in log.rows if not accepted(row)]
     ends = dict.fromkeys(f"{row.scene} x {row.method}: {row.status}: {row.reason}" for row in failed)
     lines = [*ends, *runner.broken()]
@@ -80,8 +71,21 @@ def execute(plan: Plan, assets: Assets | None = None) -> int:
         lines.append(f"{len(runner.reused)} results taken from earlier runs in this folder")
     print(*lines, sep="\n", end="\n" if lines else "", file=sys.stderr)
     if answer is not None:
-        print(log.folder.report_path.resolve(), flush=True)
+        print(*ends_with(log.folder, log.rows), sep="\n", flush=True)
     return 0 if answer is not None and not failures else 1
+
+
+def ends_with(folder: RunFolder, rows: Sequence[Row]) -> Iterator[str]:
+    """Yield the paths of a run's page, PDF and rows, and commands that may come next."""
+    for path in (folder.page_path, folder.report_path, folder.rows_path):
+        yield f"{path.suffix[1:]:4}  {path.resolve()}"
+    seen = [row for row in rows if row.passed and row.metric == "cost/frame"]
+    if seen:
+        methods = list(dict.fromkeys(row.method for row in seen if row.scene == seen[0].scene))
+        shown = f"--scene {seen[0].scene} --methods {','.join(methods[:4])}"
+        yield f"film  python -m reports.film {folder.path} {shown} -o film.gif"
+    yield f"beside another run  python -m reports.compare {folder.path} OTHER"
+    yield "more motions and methods  python -m benchmarks.run full"
 
 
 class NotSettled(Exception):

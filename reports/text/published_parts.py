@@ -12,10 +12,8 @@ front of RUN                                 the answer of README
 table NAME of RUN; COLUMN, ...; METHOD, ...  all where none is named
 claims primary of RUN, ...                   or exploratory: by the first run that has both methods,
                                              which the verdict names unless it is the first of these
-counts of RUN, ...                           how many claims came out how
-runs of RUN, ...                             day and commit
+runs of RUN, ...                             day, commit, evaluations of test motions
 times of RUN, ...; METHOD, ...               as published, and by the first run that has the method
-evaluations of published runs                how often they evaluated test motions
 
 From the code come `docstring of MODULE` (its table), `recipes of NAME, ...` and the parts that `PARTS`
 names.
@@ -24,7 +22,6 @@ names.
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import fields, replace
 from functools import cache
@@ -39,7 +36,7 @@ from reports.sentences import verdict
 from reports.statistics.effects import RATIO
 from reports.statistics.means_and_spreads import mean_of
 from reports.statistics.outcomes import PUBLISHED, read_published
-from reports.statistics.paper_claims import EXPLORATORY, PRIMARY, Claim, Judged, in_words, judged
+from reports.statistics.paper_claims import EXPLORATORY, PRIMARY, Claim, Judged, judged
 from reports.statistics.pareto import NETWORK, compared_scenes, fastest, points_of, truncated
 from reports.statistics.relative_excess import excess_of, with_relative_excess
 from reports.statistics.verdicts import measure_of
@@ -82,7 +79,6 @@ def published_part(request: str) -> str:
         "front": lambda: front_sentences(read_published(folders[0])),
         "table": lambda: _table(folders[0], name, wanted, methods),
         "claims": lambda: claim_rows(name, folders),
-        "counts": lambda: claim_counts(folders),
         "runs": lambda: run_rows(folders),
         "times": lambda: time_rows([(read_published(f), _made(f, "cost")) for f in folders], wanted),
     }
@@ -138,18 +134,6 @@ def claim_rows(family: str, folders: Sequence[Path]) -> Rows:
     return rows
 
 
-def claim_counts(folders: Sequence[Path]) -> str:
-    """Return how many tests of claims came out how, those of the primary ones first."""
-    verdicts, _ = _judged(*folders)
-    lines = []
-    for name, family in FAMILIES.items():
-        counts = Counter(verdicts[claim][1].verdict for claim in family if claim in verdicts)
-        absent = len(family) - counts.total()
-        missing = [f"{absent} {'is' if absent == 1 else 'are'} not measured"] if absent else []
-        lines.append(f"Tests of {name} claims: {', '.join([in_words(counts), *missing])}.")
-    return "\n".join(lines)
-
-
 def front_sentences(run: Run) -> str:
     """Return the verdict on SNUG and two bullets, as Markdown.
 
@@ -184,28 +168,17 @@ def front_sentences(run: Run) -> str:
 
 
 def run_rows(folders: Sequence[Path]) -> Rows:
-    """Return a heading, and day and commit of each run, of each part of a merged one."""
+    """Return a heading and a row of each run, of each part of a merged one.
+
+    It has day, commit, and how often the run evaluated test motions.
+    """
+    configs = {folder.name: RunFolder(folder).read_config() for folder in folders}
     parts = [
-        (folder.name, str(part.get("finished", ""))[:10], part["commit"])
-        for folder in folders
-        for config in [RunFolder(folder).read_config()]
+        (name, str(part.get("finished", ""))[:10], part["commit"], str(len(config["test_looks"])))
+        for name, config in configs.items()
         for part in config.get("merged", [config])
     ]
-    return [("Run", "Day", "Commit"), *dict.fromkeys(parts)]
-
-
-def evaluation_rows() -> Rows:
-    """Return a heading and rows of the published runs: how often each evaluated test motions.
-
-    Runs of one protocol and split with the same number of test-set evaluations share a row.
-    """
-    runs: dict[tuple[str, str, str], list[str]] = {}
-    for path in sorted(PUBLISHED.glob("*/run.json")):
-        config = RunFolder(path.parent).read_config()
-        group = config["protocol"]["number"], str(config["split"]), str(len(config["test_looks"]))
-        runs.setdefault(group, []).append(f"`{path.parent.name}`")
-    lines = [(*group, ", ".join(runs[group])) for group in sorted(runs)]
-    return [("Protocol", "Split", "Test-set evaluations", "Runs"), *lines]
+    return [("Run", "Day", "Commit", "Test-set evaluations"), *dict.fromkeys(parts)]
 
 
 def _overview(folders: Sequence[Path], wanted: Sequence[str], methods: Sequence[str]) -> Rows:
@@ -305,11 +278,7 @@ def size_rows() -> Rows:
     return [heads, *rows]
 
 
-PARTS = {
-    "metrics of benchmarks": metric_rows,
-    "sizes": size_rows,
-    "evaluations of published runs": evaluation_rows,
-}
+PARTS = {"metrics of benchmarks": metric_rows, "sizes": size_rows}
 
 
 BEGIN, END = "<!-- generated: {} -->", "<!-- end of generated -->"

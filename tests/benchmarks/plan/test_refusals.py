@@ -49,8 +49,6 @@ WORDS = [
     ("--set metrics=bare.py", "metric 'mine/x' has no unit"),
     ("--scenes worn.py", "no garment is called 'toga'; there are tshirt, "),
     ("--methods random.py", "Python knows random as"),
-    ("--preset smoke", "--preset is no option any more: name a study"),
-    ("--motion-up z", "--motion-up is no option any more: say it behind the path"),
 ]
 HEAD = "from benchmarks.method import MethodEntry\n"
 PLAIN, MAKE = 'name="a", description="b"', "def make(**options): pass\n"

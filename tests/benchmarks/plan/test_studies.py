@@ -82,12 +82,15 @@ def test_every_study_of_the_package_has_a_question_and_can_be_planned(name):
     assert {cell.scene.name for cell in cells} == {scene.name for scene in plan.scenes}
 
 
-def test_the_list_has_the_scenes_that_the_study_measures(capsys):
-    assert run.main(["--list", "smoke:speed"]) == 0
-    measured = capsys.readouterr().out.partition("where none is named")[2].partition("\n\n")[0]
-    names = measured.splitlines()[1].split("speed", 1)[1].strip().split(", ")
-    assert names == [scene.name for scene in planned("smoke:speed").scenes]
-    assert len(measured.splitlines()) == 2
+def test_the_list_is_a_screen_with_the_studys_scenes_and_a_word_gives_names_that_have_it(capsys):
+    assert run.main(["smoke:speed", "--list"]) == 0
+    overview = capsys.readouterr().out
+    assert f"\n  speed  {', '.join(scene.name for scene in planned('smoke:speed').scenes)}\n" in overview
+    assert len(overview.splitlines()) < 45
+    assert run.main(["--list", "kick"]) == 0
+    _, *lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == 6 and all("/kick " in line for line in lines)
+    assert run.main(["--list", "snugg"]) == 2 and "did you mean snug" in capsys.readouterr().err
 
 
 def test_published_pictures_are_those_that_reports_draw():

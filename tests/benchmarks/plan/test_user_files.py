@@ -75,7 +75,9 @@ def command(files: Path, *more: str) -> int:
 def done(files) -> RunFolder:
     with contextmanager(as_before)(), redirect_stdout(StringIO()) as shown:
         assert command(files) == 1  # one of the methods is broken
-    assert shown.getvalue().splitlines()[-1] == str((files / "out" / "report.pdf").resolve())
+    for end in ("report.html", "report.pdf", "results.csv"):
+        assert f"  {(files / 'out' / end).resolve()}\n" in shown.getvalue()
+    assert "python -m reports.film out --scene lift --methods simulation,mine," in shown.getvalue()
     return RunFolder(files / "out")
 
 
