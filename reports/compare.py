@@ -24,7 +24,7 @@ EXAMPLES = """examples:
   python -m reports.compare before after --shared                of what both runs have
 
 A mean of an answer has changed beyond 2 or 5 % and the noise of both runs, with p below 0.05; rules of times,
-checks, single motions and single seeds: docs/outputs.md.
+checks, single motions and single seeds: docs/notebook/statistics.md.
 
 exit status: 0 nothing is worse or gone; 1 something is; 2 a folder is no run, or its results.csv is not of
   the digest in run.json, or the two share nothing or differ in preset, sizes, body or garment."""
