@@ -29,15 +29,21 @@ html_css_files = ["wide_tables.css"]
 
 
 class NotebookParser(MystParser):
-    """Cells of a Jupyter notebook as a page: text as it is, code as blocks; outputs are not stored."""
+    """Cells of a Jupyter notebook as a page: text as it is, code as blocks, each with its outputs."""
 
     supported = ("notebook",)
 
     def parse(self, inputstring: str, document: document) -> None:
         """Parse the cells as one text in Markdown."""
-        cells = json.loads(inputstring)["cells"]
-        texts = [(cell["cell_type"], "".join(cell["source"])) for cell in cells]
-        page = [f"```python\n{text}\n```" if kind == "code" else text for kind, text in texts]
+        page = []
+        for cell in json.loads(inputstring)["cells"]:
+            text = "".join(cell["source"])
+            page.append(f"```python\n{text}\n```" if cell["cell_type"] == "code" else text)
+            for output in cell.get("outputs", ()):
+                if picture := output.get("data", {}).get("image/png"):
+                    page.append(f"![Figure](data:image/png;base64,{''.join(picture.split())})")
+                elif output.get("name") == "stdout":
+                    page.append(f"```text\n{''.join(output['text']).rstrip()}\n```")
         super().parse("\n\n".join(page), document)
 
 

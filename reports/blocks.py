@@ -13,7 +13,7 @@ from textwrap import shorten
 
 import pandas as pd
 
-from reports.figures.charts import energy_series, error_of_page_one
+from reports.figures.charts import energy_series, error_of_page_one, excess_by_motion
 from reports.figures.plotting import Figure, Picture
 from reports.finished_run import Run
 from reports.pictures import side_by_side
@@ -94,6 +94,7 @@ BLOCKS: tuple[Heading | Figure | TableBlock, ...] = (
     TableBlock("cost"),
     Heading("Findings"),
     TableBlock("relative_excess"),
+    Figure("excess_by_motion", excess_by_motion),
     TableBlock("excess_by_time_step"),
     TableBlock("errors_in_spreads"),
     TableBlock("reference_uncertainty"),

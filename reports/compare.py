@@ -19,8 +19,6 @@ from reports.text.text_table import markdown_table
 EXAMPLES = """examples:
   python -m reports.compare before after                         chief metrics of each method; what is worse
   python -m reports.compare before after --metrics '*'           each change in a line
-  python -m reports.compare before after --metrics 'energy/*,curvature/*' --methods snug
-  python -m reports.compare before after --without-times         beside other work on the machine
   python -m reports.compare before after --shared                of what both runs have
 
 A mean of an answer has changed beyond 2 or 5 % and the noise of both runs, with p below 0.05; rules of times,

@@ -61,7 +61,8 @@ def execute(plan: Plan, assets: Assets | None = None) -> int:
     log.write_rows(rows)
     log.note_outcomes(runner)
     answer = make_report(log)
-    print(answer or "", flush=True)
+    if answer:
+        print(answer, flush=True)
     failed = [row for row in log.rows if not accepted(row)]
     ends = dict.fromkeys(f"{row.scene} x {row.method}: {row.status}: {row.reason}" for row in failed)
     lines = [*ends, *runner.broken()]

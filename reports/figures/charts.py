@@ -1,4 +1,4 @@
-"""Charts of the report: error against run time, and energies frame by frame."""
+"""Charts of the report: error against run time, relative excess by motion, energies frame by frame."""
 
 from __future__ import annotations
 
@@ -11,12 +11,16 @@ import pandas as pd
 
 from benchmarks.metric import Metric
 from reports.figures.plotting import (
+    GRID,
+    PAGE_WIDTH,
+    PANEL,
     Drawing,
     Style,
     family_style,
     file_name,
     fit,
     log_axis,
+    new_figure,
     new_panels,
     power_text,
     style,
@@ -34,6 +38,7 @@ from reports.statistics.pareto import (
     run_time,
     time_label,
 )
+from reports.statistics.relative_excess import RELATIVE_EXCESS, SKINNING, with_relative_excess
 from reports.tables.table import scene_in_words
 
 if TYPE_CHECKING:
@@ -203,6 +208,36 @@ def _draw_page_one(
         names = ", ".join(run.label(method) for method in run.ordered(below))
         caption += f" Zero or below the panel: {names}."
     return Drawing(figure, "error_against_time", caption)
+
+
+MOST_ROWS, ROW = 15, 0.19  # methods, and inches of each
+
+
+def excess_by_motion(run: Run) -> Drawing | None:
+    """Draw a row for each method of each garment, a dot for each motion: relative excess, mean over seeds."""
+    rows = with_relative_excess(run, run.garment_rows)
+    rows = rows[(rows["metric"] == RELATIVE_EXCESS.name) & rows["usable"]]
+    rows = rows[~rows["method"].isin([*run.with_role("reference", OF_REFERENCE), SKINNING])]
+    excesses = rows.groupby(["garment", "method", "scene"])["value"].mean()
+    medians = excesses.groupby(["garment", "method"]).median().sort_values()
+    if len(excesses) == len(medians):  # none in two motions
+        return None
+    several = medians.index.unique("garment").size > 1
+    labels = [run.label(name) + f", {garment}" * several for garment, name in medians.index]
+    figure = new_figure(PAGE_WIDTH, max(ROW * min(len(medians), MOST_ROWS), PANEL) + 0.6)
+    axes = figure.add_subplot(xlabel="relative excess [%]")
+    axes.set_xscale("symlog", linthresh=10.0)
+    axes.xaxis.set_major_formatter(lambda value, _: power_text(value))
+    axes.grid(True, axis="x", color=GRID, linewidth=0.6)
+    for place, (key, median) in enumerate(medians[:MOST_ROWS].items()):
+        values, colour = excesses[key], style(run, key[1]).colour
+        axes.plot(values, [place] * len(values), "o", color=colour, markersize=SMALL, alpha=0.6, mew=0.0)
+        axes.plot(median, place, "|", color="black", markersize=9.0)
+    axes.set_yticks(range(len(labels[:MOST_ROWS])), labels[:MOST_ROWS])
+    axes.invert_yaxis()
+    caption = "A dot for each motion: 0 is the simulation, 100 skinning alone; bar: the median."
+    caption += f" Higher medians: {', '.join(labels[MOST_ROWS:])}." * (len(labels) > MOST_ROWS)
+    return Drawing(figure, "excess_by_motion", caption)
 
 
 TERMS = ("strain", "bending", "inertia")

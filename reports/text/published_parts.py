@@ -15,15 +15,14 @@ claims primary of RUN, ...                   or exploratory: by the first run th
 runs of RUN, ...                             day, commit, evaluations of test motions
 times of RUN, ...; METHOD, ...               as published, and by the first run that has the method
 
-From the code come `docstring of MODULE` (its table), `recipes of NAME, ...` and the parts that `PARTS`
-names.
+From the code come `docstring of MODULE` (its table) and the parts that `PARTS` names.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from functools import cache
 from importlib import import_module
 from pathlib import Path
@@ -47,8 +46,6 @@ from reports.tables.pivots import metric_tables
 from reports.tables.table import DASH, Table, number
 from reports.text.published_times import time_rows
 from reports.text.text_table import markdown_table, remarks_on, text_rows
-from snug.named_recipes import RECIPES
-from snug.recipe import Recipe
 
 TIMED = ("quick",)  # runs with nothing beside them, which judge claims on times
 TIMES = ("s", "ms")  # units
@@ -75,7 +72,6 @@ def published_part(request: str) -> str:
         return markdown_table(_overview(folders, wanted, methods))
     forms: dict[str, Callable[[], str | Rows]] = {
         "docstring": lambda: docstring_rows(source),
-        "recipes": lambda: recipe_rows(source),
         "front": lambda: front_sentences(read_published(folders[0])),
         "table": lambda: _table(folders[0], name, wanted, methods),
         "claims": lambda: claim_rows(name, folders),
@@ -215,9 +211,6 @@ def _made(folder: Path, name: str) -> Table:
     return tables[0]
 
 
-ALL = 10_000  # frames or more: whole motions
-
-
 def chosen_rows(rows: Rows, names: Sequence[str]) -> Rows:
     """Return the heading and the rows whose first cells have these names, in their order; all without names.
 
@@ -240,26 +233,6 @@ def docstring_rows(module: str) -> Rows:
     return [rows[0], *rows[2:]]
 
 
-def recipe_rows(names: str) -> Rows:
-    """Return a heading and a row of each option in which recipes differ, with its values.
-
-    Args:
-        names: of the recipes, as "default, paper".
-
-    >>> recipe_rows("default, paper")[4]
-    ('`zero_last_layer`', 'True', 'False')
-    """
-    chosen = names.split(", ")
-    rows = []
-    for option in fields(Recipe)[1:]:
-        values = [getattr(RECIPES[name], option.name) for name in chosen]
-        if len(set(values)) > 1:
-            rows.append(
-                (f"`{option.name}`", *(f"{v:g}" if isinstance(v, float) else str(v) for v in values))
-            )
-    return [("Option", *(f"Recipe `{name}`" for name in chosen)), *rows]
-
-
 def metric_rows() -> Rows:
     """Return a heading and a row of each declared metric: name, unit, definition."""
     rows = ((f"`{metric.name}`", metric.unit, metric.definition) for metric in declared().values())
@@ -272,7 +245,7 @@ def size_rows() -> Rows:
     rows = []
     for preset in PRESETS:
         motions = "all" if preset.test_motions is None else str(preset.test_motions)
-        frames = "all" if preset.frames >= ALL else f"at most {preset.frames}"
+        frames = "all" if preset.frames >= 10_000 else f"at most {preset.frames}"
         sizes = (str(preset.garment_vertices), motions, frames, f"{preset.steps['snug']:,}")
         rows.append((f"`{preset.name}`", *sizes))
     return [heads, *rows]

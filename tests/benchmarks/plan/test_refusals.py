@@ -17,14 +17,8 @@ FIELDS = [  # study.toml -> line, field, and what is near it
     ("split = 'tset'", "split: 'tset': choose from test, validation"),
     ("sizes = 'huge'", "sizes: unknown preset 'huge'; choose from smoke, small, quick, paper"),
     ("[sizes]\nbase = 'smoke'\nframe = 3", "study.toml: line 3: sizes.frame: no field is called 'frame'"),
-    (
-        "[parts.garmnts]",
-        "study.toml: line 1: parts.garmnts: no part is called so; choose from garments, ",
-    ),
-    (
-        "[parts.speed]\nscenes = ['flagg']",
-        "study.toml: line 2: parts.speed.scenes: unknown scene 'flagg'",
-    ),
+    ("[parts.garmnts]", "line 1: parts.garmnts: no part is called so; choose from garments, "),
+    ("[parts.speed]\nscenes = ['flagg']", "line 2: parts.speed.scenes: unknown scene 'flagg'"),
     ("garment = { units = 'cm' }", "study.toml: line 1: garment: path is absent: give it"),
     ("garment = { path = 'tshirt.obj' }", "the project has scenes of that name: give the file another"),
 ]
@@ -34,6 +28,7 @@ WORDS = [
     ("--set sizes.frames=2", "sizes.frames: 2: give 3 or more"),
     ("--scenes tshirt/walk", "see test_motions"),
     ("--methods sung", "did you mean snug"),
+    ("--list snugg", "--list snugg: did you mean snug"),
     ("--motions broken.npz", "broken.npz"),
     ("--motions short.npz", "2 frames; at least 3 are needed"),
     ("--motions walk.npz", "the name 'walk' is taken; rename the file"),

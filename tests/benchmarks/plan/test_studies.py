@@ -87,10 +87,7 @@ def test_the_list_is_a_screen_with_the_studys_scenes_and_a_word_gives_names_that
     overview = capsys.readouterr().out
     assert f"\n  speed  {', '.join(scene.name for scene in planned('smoke:speed').scenes)}\n" in overview
     assert len(overview.splitlines()) < 45
-    assert run.main(["--list", "kick"]) == 0
-    _, *lines = capsys.readouterr().out.splitlines()
-    assert len(lines) == 6 and all("/kick " in line for line in lines)
-    assert run.main(["--list", "snugg"]) == 2 and "did you mean snug" in capsys.readouterr().err
+    assert run.main(["--list", "kick"]) == 0 and capsys.readouterr().out.count("/kick ") == 6
 
 
 def test_published_pictures_are_those_that_reports_draw():

@@ -77,7 +77,7 @@ def done(files) -> RunFolder:
         assert command(files) == 1  # one of the methods is broken
     for end in ("report.html", "report.pdf", "results.csv"):
         assert f"  {(files / 'out' / end).resolve()}\n" in shown.getvalue()
-    assert "python -m reports.film out --scene lift --methods simulation,mine," in shown.getvalue()
+    assert "\nfilm  python -m reports.film out --scene lift --methods " in shown.getvalue()
     return RunFolder(files / "out")
 
 

@@ -13,6 +13,7 @@ from matplotlib.transforms import Bbox
 from reports.blocks import FIGURES
 from reports.figures.plotting import PAGE_WIDTH, Drawing
 from reports.statistics.outcomes import PUBLISHED, read_published
+from reports.statistics.relative_excess import excess_of, with_relative_excess
 
 LEAST = 4.0  # [cm] that a panel is wide and high on paper
 PRINTED = 17.0 / 2.54 / PAGE_WIDTH  # inches on paper of an inch of a figure as wide as the page
@@ -27,15 +28,22 @@ def drawings() -> list[Drawing]:
 
 
 def test_panels_of_many_methods_are_at_least_four_centimetres_wide_and_high(drawings):
-    assert len(drawings) == 2
+    assert len(drawings) == 3
     for drawing in drawings:
         FigureCanvasAgg(drawing.canvas).draw()
         scale = 2.54 * min(PRINTED, 17.0 / 2.54 / drawing.canvas.get_figwidth()) / drawing.canvas.dpi
         for axes in drawing.canvas.axes:
             width, height = (scale * length for length in axes.get_window_extent().bounds[2:])
-            assert min(width, height) >= LEAST, (
-                f"{drawing.name}: a panel of {width:.1f} x {height:.1f} cm"
-            )
+            assert min(width, height) >= LEAST, drawing.name
+
+
+def test_dots_of_many_methods_are_their_excesses_in_each_motion(drawings):
+    (axes,) = next(d.canvas for d in drawings if d.name == "excess_by_motion").axes
+    row = [tick.get_text() for tick in axes.get_yticklabels()].index("SNUG")
+    run = read_published(PUBLISHED / "ablations")
+    excess = excess_of(run, with_relative_excess(run, run.garment_rows), "snug")
+    assert sorted(axes.lines[2 * row].get_xdata()) == pytest.approx(sorted(excess.by_motion.values()))
+    assert len(axes.get_yticks()) == 15
 
 
 def test_no_text_covers_another_or_a_panel_and_all_are_inside_the_figure(drawings):
