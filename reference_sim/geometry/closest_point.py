@@ -210,7 +210,7 @@ class FaceSearch:
     """Search of closest points on faces (F, 3) that move. Call `refit` before the first search.
 
     By the centroids (F, 3) [m] at rest, in a pose that spreads the mesh, leaves are made and the rule of
-    regions decides. Positions are kept in their type, float64 or float32.
+    regions decides.
     """
 
     def __init__(self, faces: np.ndarray, centroids: np.ndarray) -> None:
@@ -223,16 +223,16 @@ class FaceSearch:
         # share.
         ascending = np.argsort(self.faces[order], axis=1, kind="stable")
         vertices = np.take_along_axis(self.faces[order], ascending, axis=1)
-        kind, blocks = centroids.dtype, -(-leaves // LANES)
+        blocks = -(-leaves // LANES)
         self._mesh = Mesh(
             order, vertices, _each_once(vertices.reshape(leaves, -1)), ascending, place,
-            np.ascontiguousarray(centroids[order]), np.zeros((blocks, 6, LANES), np.float32),
-            np.zeros(leaves, np.int64), np.zeros(leaves, np.int64), np.zeros((len(order), 3, 3), kind),
+            np.ascontiguousarray(centroids[order], np.float64), np.zeros((blocks, 6, LANES), np.float32),
+            np.zeros(leaves, np.int64), np.zeros(leaves, np.int64), np.zeros((len(order), 3, 3)),
             np.zeros((9, LANES)), np.zeros((leaves, 5), np.float32),
             np.zeros((leaves, QUANTITIES * LANES), np.float32), np.zeros(1),
         )  # fmt: skip
-        self._pose = Pose(0, np.empty((0, 3), kind), np.zeros(3))
-        everywhere, none, masks = np.arange(leaves), np.zeros((1, 3), kind), np.full(blocks, 2**LANES - 1)
+        self._pose = Pose(0, np.empty((0, 3)), np.zeros(3))
+        everywhere, none, masks = np.arange(leaves), np.zeros((1, 3)), np.full(blocks, 2**LANES - 1)
         masks[-1] >>= LANES * blocks - leaves
         self._everywhere = Listed(
             place, np.zeros(1, np.int64), np.full(1, blocks), np.arange(blocks), masks, everywhere, none,
@@ -241,8 +241,8 @@ class FaceSearch:
 
     def refit(self, positions: np.ndarray) -> None:
         """Move the mesh to positions (B, 3) [m], which stay as they are until the next call."""
-        positions = np.ascontiguousarray(positions, self._mesh.corners.dtype)
-        origin = positions[len(positions) // 2].astype(np.float64)
+        positions = np.ascontiguousarray(positions, np.float64)
+        origin = positions[len(positions) // 2].copy()
         self._pose = Pose(self._pose.number + 1, positions, origin)
         self._mesh.size[0] = 0.0
 
@@ -252,7 +252,7 @@ class FaceSearch:
         A sample meets only faces whose rest centroid lies no farther than `region` [m] from its point
         here; where there is none, all.
         """
-        points = np.ascontiguousarray(points, self._mesh.corners.dtype)
+        points = np.ascontiguousarray(points, np.float64)
         order, whole = halved(points), self._everywhere
         if region == np.inf:
             return whole._replace(order=order)
@@ -283,7 +283,7 @@ class FaceSearch:
         sample farther away than this may get any point at most twice as far as the closest: a remembered
         face then often does, for a third of the cost.
         """
-        points = np.ascontiguousarray(points, self._mesh.corners.dtype)
+        points = np.ascontiguousarray(points, np.float64)
         faces = np.full(len(points), -1) if hints is None else np.array(hints, np.int64)
         barycentric, closest = np.empty((len(points), 3)), np.empty((len(points), 3))
         if samples is None:

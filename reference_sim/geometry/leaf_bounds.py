@@ -257,8 +257,8 @@ def closest_on_triangle(corners, place, x, y, z):
     """
     # As numbers: a function with several ends counts the references to an array at every call.
     return _closest(
-        np.float64(corners[place, 0, 0]), np.float64(corners[place, 0, 1]), np.float64(corners[place, 0, 2]),
-        np.float64(corners[place, 1, 0]), np.float64(corners[place, 1, 1]), np.float64(corners[place, 1, 2]),
-        np.float64(corners[place, 2, 0]), np.float64(corners[place, 2, 1]), np.float64(corners[place, 2, 2]),
+        corners[place, 0, 0], corners[place, 0, 1], corners[place, 0, 2],
+        corners[place, 1, 0], corners[place, 1, 1], corners[place, 1, 2],
+        corners[place, 2, 0], corners[place, 2, 1], corners[place, 2, 2],
         x, y, z,
     )  # fmt: skip

@@ -173,7 +173,7 @@ def contact_energy(
     """
     # Normals have 127 times unit length, within 0.9 by rounding.
     reach = np.float32(128.0) * (margin + slack if walk else margin)
-    zero, corners = np.float32(0.0), np.empty((1, 3, 3), np.float32)
+    zero, corners = np.float32(0.0), np.empty((1, 3, 3))
     vertices, size = x.shape[1], 3 * positions.shape[1]
     garment = np.zeros(3 * vertices + 1, np.float32)
     skin, m = np.zeros(size + 1, np.float32), np.zeros(size + 1, np.float32)
