@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import importlib.util
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,7 @@ from benchmarks.results.row import ROLES
 if TYPE_CHECKING:
     import numpy as np
 
+    from benchmarks.presets import Preset
     from benchmarks.scene import BuiltScene, Dressed, Scene
     from reference_sim.trajectory import Trajectory
     from snug.recipe import Recipe
@@ -53,6 +54,13 @@ class Training:
     recipe: Recipe
     simulated: Simulated | None = None
     packaged: str = field(default="", metadata={"added": True})
+
+    def at(self, preset: Preset) -> Training:
+        """Return the training with no more simulated augmented frames than a preset has, and its turns."""
+        simulated, recipe = self.simulated, replace(self.recipe, turn=preset.turns * self.recipe.turn)
+        if simulated:
+            simulated = replace(simulated, mixed=min(simulated.mixed, preset.simulated_mixed))
+        return replace(self, recipe=recipe, simulated=simulated)
 
 
 class WorkerDied(RuntimeError):

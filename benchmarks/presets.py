@@ -29,9 +29,10 @@ class Preset:
     each that trains; clip_frames: of its liveliest part;
     warm_up_frames: at the beginning of a dressed scene, simulated and not evaluated, before those of a
     clip; loop_frames: of the walk in a loop.
-    steps: optimiser steps per kind of network, or per training. settle_frames: frames from the T-pose
-    into the first pose of a motion. sheet_cells: the small scenes are sheets of so many cells along each
-    side.
+    steps: optimiser steps per kind of network, or per training. simulated_mixed: most augmented frames
+    that are simulated for each original one; turns: share of a recipe's turns in augmented frames.
+    settle_frames: frames from the T-pose into the first pose of a motion. sheet_cells: the small scenes
+    are sheets of so many cells along each side.
     gap_samples: frames of a trajectory, at least, at which part speed solves the step again to know the
     gap to its minimum. least_seconds [s]: of run time to be measured of each timed cell, whose short run
     is done again until then. repeats: times that a cell of part speed is run, those whose first run took
@@ -58,9 +59,11 @@ class Preset:
     repeat_seconds: float
     cell_seconds: float
     dependence: Dependence
+    simulated_mixed: int = 1_000_000
+    turns: float = 1.0
 
     def steps_of(self, training: str, kind: str) -> int:
-        """Return the optimiser steps of a training by its name, else its kind; 0 for an untrained network."""
+        """Return the optimiser steps of a training by its name, else its kind."""
         return self.steps.get(training, self.steps.get(kind, 0))
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 
 from benchmarks.plan.cell import flat
 from benchmarks.plan.plan import make_plan
-from benchmarks.plan.study import Show, Study, StudyError, read_study, study_names
+from benchmarks.plan.study import Show, Study, StudyError, option, read_study, study_names
 from benchmarks.provenance import commit, digest_of_file
 from benchmarks.results.row import USABLE, ResultsError
 from benchmarks.results.run_folder import RunFolder, model_path
@@ -76,7 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         raise StudyError(f"study {silent[0]}: has no [show]: the studies {', '.join(known)} do")
     if head.endswith("+changes"):
         raise StudyError(f"{head}: commit the changes first, so that a commit says what was run")
-    plans = {name: make_plan(read_study(name), folder=options.out / Path(name).stem) for name in names}
+    plans = {name: make_plan(with_seeds(name), folder=options.out / Path(name).stem) for name in names}
     due = [name for name in names if not is_published(TARGET / Path(name).stem, plans[name].study, head)]
     for name in names:
         state = describe(plans[name]).rpartition("\n")[2] if name in due else "is published"
@@ -130,6 +130,13 @@ def published_studies() -> list[str]:
     return [name for name in study_names() if read_study(name).show is not None]
 
 
+def with_seeds(name: str) -> Study:
+    """Return a study with the seeds that are published of it."""
+    study = read_study(name)
+    seeds = study.show.seeds if study.show else ()
+    return read_study(name, [option("seeds", [*seeds])]) if seeds else study
+
+
 def is_published(target: Path, study: Study, head: str) -> bool:
     """Return whether a folder has what is published of a study as it is, computed by commit `head`."""
     if not (target / "run.json").is_file():
@@ -146,7 +153,10 @@ def publish(name: str, out: Path, into: Path, head: str) -> None:
     """
     show, whole = read_study(name).show, out / Path(name).stem
     assert show is not None
-    _call("benchmarks.run", name, "--retry", "-o", str(whole))  # as a task that lacked memory once
+    seeds = ["--seeds", ",".join(map(str, show.seeds))] if show.seeds else []
+    _call(
+        "benchmarks.run", name, *seeds, "--retry", "-o", str(whole)
+    )  # as a task that lacked memory once
     if not all_usable(RunFolder(whole)):
         raise ResultsError(f"{whole}: has failed")
     if others := sorted({row.commit for row in RunFolder(whole).read_rows()} - {head, ""}):

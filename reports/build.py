@@ -8,12 +8,17 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command_line import Parser, command
+
+if TYPE_CHECKING:
+    from reports.blocks import Report
 
 
 @dataclass(frozen=True)
@@ -43,9 +48,9 @@ def build_report(run_dir: str | Path) -> Built:
     """
     # Heavy: not needed for --help.
     from reports.blocks import FIGURES, Report
+    from reports.compare import against_published
     from reports.figures.plotting import draw_figures
     from reports.finished_run import read_run
-    from reports.page.write_page import write_page
     from reports.pdf import write_pdf
     from reports.tables import make_tables, write_tables
     from reports.text.for_your_paper import write_paper_table
@@ -59,9 +64,20 @@ def build_report(run_dir: str | Path) -> Built:
     if folder.trajectories.is_dir():  # else pictures of roll-outs that are gone stay
         for path in [path for figure in FIGURES for path in figure.files_in(folder.figures)]:
             path.unlink()
-    report = Report(run, tables, draw_figures(run, folder.figures, FIGURES))
+    with ProcessPoolExecutor(1) as beside:  # the page takes as long as figures and PDF
+        page = beside.submit(_write_page, folder, Report(run, tables, {}))
+        pdf = write_pdf(folder, Report(run, tables, draw_figures(run, folder.figures, FIGURES)))
+        problems = dict.fromkeys([*run.problems, *page.result(), *run.warnings])
+    lines = filter(None, (answer(run, tables), against_published(run)))
+    return Built(pdf, list(problems), "\n".join(lines))
+
+
+def _write_page(folder: RunFolder, report: Report) -> list[str]:
+    """Write report.html; return what could not be read."""
+    from reports.page.write_page import write_page
+
     write_page(folder, report)
-    return Built(write_pdf(folder, report), [*run.problems, *run.warnings], answer(run, tables))
+    return report.run.problems
 
 
 def build_row(run_dir: str | Path) -> str:

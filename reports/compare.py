@@ -7,12 +7,16 @@ by itself, over its seeds.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
 
+from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.command_line import Parser, command
 from reports.comparison import HEADLINE, Comparison, compare
 from reports.finished_run import Run, read_run
 from reports.scene_changes import BETTER, FAILING, GONE, OTHER, WORSE
+from reports.statistics.outcomes import PUBLISHED, read_published
 from reports.statistics.relative_excess import RELATIVE_EXCESS
 from reports.text.text_table import markdown_table
 
@@ -60,6 +64,26 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if short and comparison.changes:
         print("Each change: --metrics '*'")
     return 1 if any(change.verdict in FAILING for change in comparison.changes) else 0
+
+
+def against_published(run: Run, published: Path = PUBLISHED) -> str:
+    """Return in a line how a run agrees with the published one of its study; empty without one.
+
+    Networks of one seed are judged by the prediction interval of the published seeds.
+    """
+    study: dict[str, Any] = run.config.get("study") or {}
+    folder = published / str(study.get("name")).partition(":")[0]
+    if study.get("trained") or not RunFolder(folder).config_path.is_file():
+        return ""
+    try:
+        comparison = compare(read_published(folder), run, times=False, shared=True)
+    except ResultsError as error:
+        return f"published: not compared ({error})"
+    if not comparison.changes:
+        return f"published: reproduced ({comparison.compared} means)"
+    rows = dict.fromkeys(f"{run.label(c.method)} in {c.place}" for c in comparison.changes)
+    shown = ", ".join([*rows][:MOST_CHANGES]) + ", ..." * (len(rows) > MOST_CHANGES)
+    return f"published: {len(comparison.changes)} numbers differ: {shown}"
 
 
 MOST_METHODS, MOST_CHANGES = 16, 8  # lines without --metrics or --methods

@@ -30,7 +30,21 @@ def headline(run: Run) -> list[tuple[str, str]]:
 @lru_cache(maxsize=4)
 def _measured(run: Run) -> dict[str, str]:
     worn = run.garment_rows[run.garment_rows["garment"] == run.first_garment]
-    return {"Verdict": verdict(run, worn), "How certain": _certainty(run)}
+    return {"Verdict": verdict(run, worn), TRAINED: _trained(run, worn), "How certain": _certainty(run)}
+
+
+TRAINED = "How far trained"
+
+
+def _trained(run: Run, worn: pd.DataFrame) -> str:
+    """Say how far networks of the run are from the package's, which are fully trained."""
+    rows, texts = with_relative_excess(run, worn), []
+    for name in run.with_role("network"):
+        here, full = (excess_of(run, rows, trained) for trained in (name, f"{name}-packaged"))
+        if here and full and here.typical != full.typical:
+            shares = f"{number(here.typical, 2)} %, fully trained {number(full.typical, 2)} %"
+            texts.append(f"{run.label(name)} {shares}")
+    return f"Relative excess as trained in this run: {'; '.join(texts)}." if texts else ""
 
 
 def verdict(run: Run, worn: pd.DataFrame) -> str:

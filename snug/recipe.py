@@ -69,6 +69,8 @@ class Recipe:
         mixed: frames of augmented motions (snug.training.augmentation) for each frame of a
             training motion, up to 20,000; not for networks that learn simulated vertices, whose clips
             are simulated beforehand.
+        turn: standard deviation of the slow turns added in them [rad]. Wide ones help a long training and
+            cost a short one much (docs/notebook/training.md).
         terms: energies in the loss, TERMS or any other that `find_energy` knows.
         physics_weight: lambda [cm^2/J] of the loss of networks that learn simulated vertices: mean squared
             distance [cm^2] + lambda * the sum of `terms` [J]. With 0 the distance alone; energies alone
@@ -111,6 +113,7 @@ class Recipe:
     contact_stiffness: float | None = None
     contact_margin: float | None = None
     mixed: float = 12.0
+    turn: float = field(default=0.2, metadata={"added": True})
     terms: tuple[str, ...] = TERMS
     physics_weight: float = field(default=0.0, metadata={"added": True})
     inertia_form: str = "equation_5"
@@ -146,7 +149,8 @@ class Recipe:
         if "inertia" in self.terms and self.window < 3:
             raise RecipeError("recipe option window: inertia needs two frames before its own, so >= 3")
         for option in (
-            "smoothing", "weight_decay", "h0_sigma", "shape_range", "shape_share", "mixed", "physics_weight",
+            "smoothing", "weight_decay", "h0_sigma", "shape_range", "shape_share", "mixed", "turn",
+            "physics_weight",
         ):  # fmt: skip
             if not getattr(self, option) >= 0:
                 raise RecipeError(f"recipe option {option}={getattr(self, option)}: must not be negative")

@@ -75,9 +75,6 @@ def network(
 
 
 NAMED = (
-    network("untrained", "SNUG, untrained",
-            "the SNUG network with a random last layer (SNUG itself starts as skinning)",
-            role="baseline", timed=False),  # a frame of it costs what one of SNUG does
     network("snug", "", "recurrent network trained on the energies alone (Santesteban et al. 2022)"),
     network("supervised", "",
             "the SNUG network trained on simulated vertices, strain and collision; augmented clips too"),

@@ -134,7 +134,7 @@ class Network(Method):
 
 
 def make_network(*, models: Path, seed: int, kind: str, cleanup: bool = False) -> Network:
-    """Make the network of that name and seed: "untrained" or a key of TRAININGS."""
+    """Make the network of that name and seed."""
     return Network(model_path(models, kind, seed), cleanup)
 
 

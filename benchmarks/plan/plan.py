@@ -58,14 +58,14 @@ class Network:
         return "network", f"{self.garment}/{self.name}-seed{self.seed}"
 
     @property
-    def training(self) -> Training | None:
-        """The training; None: an untrained network."""
-        return self.users_training or TRAININGS.get(self.name)
+    def training(self) -> Training:
+        """The training, as declared."""
+        return self.users_training or TRAININGS[self.name]
 
     @property
     def packaged(self) -> str:
         """Name of the network of the package that it is; empty: it is trained, or of another run."""
-        return self.training.packaged if self.training else ""
+        return self.training.packaged
 
 
 @dataclass(frozen=True, kw_only=True)

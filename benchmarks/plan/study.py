@@ -60,11 +60,13 @@ class Show:
         networks: names of networks whose seed 0 is kept, in half precision.
         pictures: names of figures of the report that the documents show.
         films: file -> options of reports.film.
+        seeds: of the published run, by which one seed is judged; by default those of the study.
     """
 
     networks: tuple[str, ...] = ()
     pictures: tuple[str, ...] = ()
     films: Mapping[str, str] = field(default_factory=dict)
+    seeds: tuple[int, ...] = ()
 
     @property
     def files(self) -> tuple[str, ...]:

@@ -14,7 +14,7 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from benchmarks.declarations import DeclarationError, by_name, demand_that_it_is, load, raised_at
-from benchmarks.method import MethodEntry, Training
+from benchmarks.method import MethodEntry
 from benchmarks.methods.declared_networks import TRAININGS
 from benchmarks.metric import Metric
 from benchmarks.metrics import MEASUREMENTS
@@ -82,7 +82,7 @@ def declarations_of(study: Study) -> tuple[Study, list[Scene], list[MethodEntry]
 
 def check_networks(entries: Sequence[MethodEntry]) -> None:
     """Raise DeclarationError where two trainings have one name: one network would be the other's."""
-    trainings: dict[str, Training | None] = {**TRAININGS, "untrained": None}
+    trainings = dict(TRAININGS)
     for entry in (entry for entry in entries if entry.trained is not None):
         what, name = f"{entry.declared_in}: method '{entry.name}'", str(entry.trained)
         known = entry.training or name in trainings

@@ -19,6 +19,9 @@ if TYPE_CHECKING:
     from snug.motion.motion import Motion
 
 
+GRID = 2.0**13  # places to a metre of the body in its file, which is for the eye: half the size again
+
+
 def settle_start(scene: Scene, context: Context, needed: Needed) -> Outcome:
     """Write the garment settled in the first pose of a scene, and the posed body.
 
@@ -32,7 +35,7 @@ def settle_start(scene: Scene, context: Context, needed: Needed) -> Outcome:
     built, run, shared = scene.build(context.assets), context.folder, scene.start_of
     assert built.obstacle is not None
     Trajectory(
-        positions=built.obstacle.positions.astype(np.float32),  # for the eye: half the size
+        positions=np.round(built.obstacle.positions * GRID).astype(np.float32) / np.float32(GRID),
         faces=built.obstacle.faces,
         times=np.arange(built.frames) * built.dt,
         provenance={"what": "the body of this scene"},

@@ -56,7 +56,7 @@ def measure_cell(
         for name, curve in curves.items()
     }
     with replacing(path) as temporary:
-        np.savez(temporary, **padded)
+        np.savez_compressed(temporary, **padded)
     return Outcome(status, reason, result=metrics, files=(folder.relative(path),))
 
 

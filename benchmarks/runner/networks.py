@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     import numpy as np
 
     from benchmarks.assets import Assets
+    from benchmarks.method import Training
     from benchmarks.plan.plan import Network
     from snug.motion.motion import Motion
     from snug.networks.trained_model import TrainedModel
@@ -35,10 +36,11 @@ CHECKPOINT_MINUTES = 1.0  # between two checkpoints: what a kill loses at most
 
 @dataclass(frozen=True, kw_only=True)
 class NetworkTraining:
-    """Training of a network, or an untrained one.
+    """Training of a network.
 
     Attributes:
-        network: its name, seed, garment and declared training.
+        network: its name, seed and garment.
+        training: by the sizes of the run.
         steps: of the training.
         motions: what it learns from.
         reads: tasks that simulate motions and mixed clips, where it learns from simulations.
@@ -49,6 +51,7 @@ class NetworkTraining:
     """
 
     network: Network
+    training: Training
     steps: int
     motions: tuple[str, ...]
     reads: tuple[TaskId, ...] = ()
@@ -59,8 +62,7 @@ class NetworkTraining:
     @property
     def work(self) -> float:
         """Expected duration, in steps of SNUG's network."""
-        training = self.network.training
-        return self.steps * KINDS[training.kind].cost if training else 0.0
+        return self.steps * KINDS[self.training.kind].cost
 
     def path(self, folder: RunFolder) -> Path:
         """Return the path of the trained model."""
@@ -74,10 +76,10 @@ def train(job: NetworkTraining, context: Context, needed: Needed) -> Outcome:
     from reference_sim.trajectory import Trajectory
     from snug.networks.dressed_body import DressedBody
     from snug.training.checkpoint import Checkpoint
-    from snug.training.train_network import train_network, untrained_model
+    from snug.training.train_network import train_network
 
     torch.set_num_threads(1)
-    network, training = job.network, job.network.training
+    network, training = job.network, job.training
     if network.declared_in:  # as of an energy of its recipe
         load(network.declared_in)
     assets, run = context.assets, context.folder
@@ -96,14 +98,11 @@ def train(job: NetworkTraining, context: Context, needed: Needed) -> Outcome:
         path=path.with_name(f".{path.stem}.checkpoint.safetensors"), minutes=CHECKPOINT_MINUTES,
         resume=True, key=digest([job.key, targets]),
     )  # fmt: skip
-    if training is None:
-        model = untrained_model("snug", dressed, assets.named(motions), seed=job.network.seed)
-    else:
-        model = train_network(
-            training.kind, dressed, [*assets.named(motions), *mixed], steps=job.steps,
-            seed=job.network.seed, trajectories=targets, recipe=training.recipe, progress=False,
-            every=EVERY, device=job.device, checkpoint=checkpoint,
-        )  # fmt: skip
+    model = train_network(
+        training.kind, dressed, [*assets.named(motions), *mixed], steps=job.steps, seed=network.seed,
+        trajectories=targets, recipe=training.recipe, progress=False, every=EVERY, device=job.device,
+        checkpoint=checkpoint,
+    )  # fmt: skip
     model.origin = origin_of(job, needed, left_out=[name for name in job.motions if name not in motions])
     outcome = _outcome(model, job, run, {})
     checkpoint.delete()
@@ -132,8 +131,7 @@ def _outcome(model: TrainedModel, job: NetworkTraining, run: RunFolder, facts: d
 
 def origin_of(job: NetworkTraining, needed: Needed, *, left_out: list[str]) -> dict[str, Any]:
     """Return what the file of the model says of its training; left_out: motions without simulation."""
-    training = job.network.training
-    simulated = training.simulated if training else None
+    simulated = job.training.simulated
     return {
         "network": job.network.name,
         "garment": job.network.garment,

@@ -5,6 +5,7 @@ Loads nothing heavy: a dry run makes the same tasks as a run.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import groupby
@@ -83,6 +84,7 @@ def users_code(*homes: str) -> tuple[str, ...]:
 TRAINED = "training"  # the stage of networks that no file has
 # cells of one scene whose processes wait for their repeats: each holds some hundred megabytes
 AT_ONCE = 8
+TOGETHER = 12  # cells of one scene that a process measures, beside those that they are compared with
 
 
 def tasks_of(plan: Plan) -> list[Task]:
@@ -129,7 +131,7 @@ class Schedule:
 
     def ground_truth(self, network: Network) -> list[Task]:
         """Return the simulations that a network learns from: those of motions, then those of clips."""
-        simulated = network.training.simulated if network.training else None
+        simulated = network.training.at(self.preset).simulated
         if simulated is None:
             return []
         entry, garment = find_method(simulated.method), network.garment
@@ -173,7 +175,7 @@ class Schedule:
             "kind": "network", "name": network.task_id[1], "label": network.label, "silent": True,
             "files": (self.folder.relative(job.path(self.folder)),),
         }  # fmt: skip
-        if folder is not None and network.training is not None:
+        if folder is not None:
             source, refusal = pretrained_network(job, folder)
             if source or not network.users_training:
                 return Task(
@@ -188,8 +190,8 @@ class Schedule:
 
     def training(self, network: Network) -> NetworkTraining:
         """Return how a network is trained."""
-        motions, chosen = self.plan.motions.train, network.training
-        steps = self.preset.steps_of(network.name, chosen.kind if chosen else network.name)
+        motions, chosen = self.plan.motions.train, network.training.at(self.preset)
+        steps = self.preset.steps_of(network.name, chosen.kind)
         inputs = self._machine(self.plan.study.device) | self._of_body(network.garment)
         if network.packaged:  # of the package's training clips, which are whole
             inputs["assets"]["train_frames"] = find_preset("quick").train_frames
@@ -200,7 +202,7 @@ class Schedule:
             }  # fmt: skip
         digests = {name: digest(value) for name, value in inputs.items()}
         return NetworkTraining(
-            network=network, steps=steps, motions=motions, device=self.plan.study.device,
+            network=network, training=chosen, steps=steps, motions=motions, device=self.plan.study.device,
             reads=tuple(task.id for task in self.ground_truth(network)), inputs=digests,
             key=digest(digests | software(*RUNNING, *users_code(network.declared_in))),
         )  # fmt: skip
@@ -285,9 +287,10 @@ class Schedule:
             entry.role, entry.reporting.family, entry.reporting.level, entry.static_known, entry.other_mesh,
         ]  # fmt: skip
         run = partial(measure_cell, cell, cells, self.preset.gap_samples, plan.metrics)
+        part = cells.index(cell) % math.ceil(len(cells) / TOGETHER)
         return Task(
             kind="metrics", name=cell.name, label=cell.label, stage="metrics",
-            run=run, needs=(cell.id(),), reads=reads, batch=scene.name,
+            run=run, needs=(cell.id(),), reads=reads, batch=f"{scene.name} {part}",
             files=(self.folder.relative(self.folder.curves_path(*cell.key)),),
             **self._of_scene(
                 scene, *MEASURING, *users_code(*plan.metrics), suites=sorted(cell.suites),

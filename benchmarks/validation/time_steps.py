@@ -1,4 +1,4 @@
-"""Known answers of time integration: a triangle that scipy solves, and the order of a sheet in dt.
+"""Known answers of time integration: a triangle that scipy solves, and its order in dt.
 
 Pendulum: one triangle hangs by its base; by symmetry its third vertex stays half-way between the two
 pins, at a distance r from the base that was h at rest, with E(r) = A (lambda/2 + mu) G^2, G = ((r/h)^2 -
@@ -7,23 +7,14 @@ pins, at a distance r from the base that was h at rest, with E(r) = A (lambda/2 
 
 from __future__ import annotations
 
-from functools import partial
-from itertools import pairwise
-from typing import Any
-
 import numpy as np
 
 import reference_sim as sim
-from benchmarks.meshes import square_sheet
 from benchmarks.validation.case import known_answer
-from benchmarks.validation.contact import RoundBody
 from benchmarks.validation.equilibrium import (
-    border,
     farthest,
-    fitted_order,
     motion,
     order,
-    sheet_terms,
 )
 from reference_sim import energies
 
@@ -112,37 +103,3 @@ def numerical_damping(frequency: float) -> tuple[float, float]:
     velocity = np.diff(path)[-1] / fitted_dt
     left = np.hypot(path[-1], velocity / natural) / amplitude
     return float(left), float((1 + (frequency * dt) ** 2) ** -15)
-
-
-BALL = 0.1  # [m] radius
-
-
-@known_answer(
-    expected=1.0, tolerance=0.1, reason="backward Euler; its second order still shows at 1/1200 s"
-)
-def pressed_time_step_order() -> float:
-    """Return the order in dt of a taut sheet that a ball, already in touch, is pressed into smoothly.
-
-    It has no exact motion: the order is that of the distance between the ends with dt and with dt/2.
-    """
-    end = 0.2
-    flat, faces = square_sheet(8, 0.4)
-    cloth = sim.Cloth(flat, faces, sim.Material(), pins=np.flatnonzero(border(flat[:, [0, 2]])))
-    terms = [*sheet_terms(cloth), energies.ContactPenalty(cloth)]
-
-    def ball(n: int) -> Any:
-        t = np.linspace(0, end, n + 1)
-        return RoundBody(BALL, heights=0.02 * np.sin(2 * np.pi * t) ** 6 - 0.8 * BALL)  # without a jolt
-
-    tent = 1.1 * flat
-    tent[:, 1] = 0.12 * np.maximum(0.2 - np.hypot(flat[:, 0], flat[:, 2]), 0.0)
-    still: Any = RoundBody(BALL, heights=[-0.8 * BALL])
-    # Contact planes follow the sheet until both agree.
-    start = sim.simulate(
-        cloth, terms, dt=1.0, frames=9, quasi_static=True, start=tent, obstacle=still, guess="previous"
-    ).positions[-1]
-    steps = (30, 60, 120, 240)
-    run = partial(motion, cloth, terms, start=start, guess="extrapolated")
-    ends = [run(dt=end / n, frames=n + 1, obstacle=ball(n))[-1] for n in steps]
-    distances = [np.sqrt(((a - b) ** 2).sum(axis=1).mean()) for a, b in pairwise(ends)]
-    return fitted_order(distances, [1 / n for n in steps[:-1]])

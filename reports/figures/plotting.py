@@ -45,7 +45,6 @@ KNOWN = {
     "simulation": Style("", "#000000", "*"),
     "simulation-perturbed": Style("", "#444444", "x", "--"),
     "skinning": Style("", "#8C8C8C", "D", "--"),
-    "untrained": Style("", "#56B4E9", "v", ":"),
     "pbns": Style("", "#009E73", "^", "-."),
     "pbns-springs": Style("", "#117733", "^", ":"),
     "pbns-paper": Style("", "#00725A", "^", "--"),

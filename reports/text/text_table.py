@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 from reports.finished_run import Run
-from reports.sentences import headline
+from reports.sentences import TRAINED, headline
 from reports.statistics.effects import Effect
 from reports.tables.table import DASH, REMARKS, CellText, Table, column_texts
 
@@ -78,6 +78,6 @@ def answer(run: Run, tables: Mapping[str, Table]) -> str:
         rows = text_rows(run, table, [name for name in COLUMNS if name in names][:MOST_COLUMNS])
         lines.append(markdown_table(rows))
         notes = [remarks_on(rows)]
-    chief = [text for topic, text in headline(run) if topic == "Verdict"]
+    chief = [text for topic, text in headline(run) if topic in ("Verdict", TRAINED)]
     lines.append(" ".join(filter(None, [*chief, *notes])))
     return "\n".join(filter(None, lines)).replace("\u00a0", " ")

@@ -48,7 +48,6 @@ TURN_SHARES = {
     "head": 1.0,
 }  # fmt: skip
 TURN_HERTZ = (0.2, 1.0)  # Hz, of the slow turns and lifts
-TURN = 0.2  # rad, standard deviation of the added turns
 LIFTED = 0.25  # share of the thighs that are lifted
 CLIP_FRAMES = 60  # of a mixed clip
 MAX_AUGMENTED_FRAMES = 20_000  # frames: each keeps its body and its anchors
@@ -69,7 +68,7 @@ def augment(motions: Sequence[Motion], recipe: Recipe, *, vertices: int, seed: i
         MAX_AUGMENTED_FRAMES,
         int(MAX_ANCHOR_BYTES / (ANCHOR_BYTES * vertices)),
     )
-    return make_mixed_clips(motions, frames, turn=TURN, lifted=LIFTED, seed=seed)
+    return make_mixed_clips(motions, frames, turn=recipe.turn, lifted=LIFTED, seed=seed)
 
 
 def make_shared_clips(motions: Sequence[Motion], share: int, *, vertices: int) -> list[Motion]:

@@ -270,3 +270,15 @@ def test_bad_input_is_one_line_and_status_2(tmp_path, refused, b, options, says)
     run_folder(tmp_path / "spoilt", a_run(), digests={"results.csv": "0" * 16})
     words = [str(tmp_path / "a"), str(tmp_path / b), *options]
     assert refused(says, command.main, words).startswith("reports.compare: ")
+
+
+def test_a_run_says_whether_it_agrees_with_the_published_one_of_its_study(tmp_path):
+    run_folder(tmp_path / "mine", a_run(), study={"name": "mine"})
+    again = [given for given in a_run(1) if given.seed == 0]
+
+    def line(rows: list[Row], name: str = "mine") -> str:
+        return command.against_published(run_of(rows, study={"name": name}), tmp_path)
+
+    odd = [times(3.0, scene=SCENES[0], **STRAIN)(given) for given in again]
+    assert line(again).startswith("published: reproduced (") and line(again, "other") == ""
+    assert line(odd) == f"published: 1 numbers differ: SNUG in {SCENES[0]}"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from reports.sentences import endings, headline
+from reports.sentences import TRAINED, endings, headline
 from reports.statistics.outcomes import leads
 from tests.reports.report_folder import SCENES, all_rows, row, run_of
 from tests.reports.tables.test_tables import on_two_scenes
@@ -43,6 +43,12 @@ def test_the_verdict_is_of_the_first_garment_and_of_unseen_motions():
     }.items():  # fmt: skip
         scenes = {name: {"role": role} for name, role in zip(SCENES, roles)}
         assert said("Verdict", rows, scenes=scenes).startswith(f"In {words} motion SNUG removes ")
+
+
+def test_a_network_is_compared_with_its_fully_trained_one():
+    full = [dataclasses.replace(r, method="snug-packaged") for r in on_two_scenes("snug", 0.6, 7.1)]
+    text = said(TRAINED, [*SNUG, *full, *PBNS, *BESIDE])
+    assert text == "Relative excess as trained in this run: SNUG 10 %, fully trained 1.0 %."
 
 
 def test_page_one_counts_every_kind_of_ending():

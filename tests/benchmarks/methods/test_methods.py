@@ -40,7 +40,7 @@ from tests.benchmarks.runner.tasks_by_hand import (
 SIZES = {"frames": 16, "settle_frames": 2, "sheet_cells": 4, "sheet_frames": 5, "gap_samples": 2}
 SIZES["least_seconds"] = 0.01
 TRAIN, TEST = "arm_raise", "kick"
-KINDS = ("untrained", "snug", "supervised-vertices", "pbns")
+KINDS = ("snug", "supervised-vertices", "pbns")
 TINY = dataclasses.replace(
     find_preset("smoke"), **SIZES, repeats=1, steps=dict.fromkeys(("snug", "supervised", "pbns"), 2)
 )
@@ -59,7 +59,7 @@ BODY = f"tshirt/{TEST}"
 # Each solver is run in one scene at least, these in all of them.
 EVERYWHERE = ("simulation", "simulation-perturbed", "skinning", "newton")
 ON_A_BODY = (
-    "untrained", "snug", "supervised-vertices", "pbns", "lbfgs", "fast-lbfgs", "vbd", "xpbd",
+    "snug", "supervised-vertices", "pbns", "lbfgs", "fast-lbfgs", "vbd", "xpbd",
     "skinning+lbfgs", "snug+newton",
 )  # fmt: skip
 NAMES = [*(scene.name for scene in SCENES), BODY]

@@ -97,7 +97,7 @@ def test_what_has_no_minimum_or_learned_vertices_has_no_own_excess(scene, simula
 
 
 def test_solvers_and_networks_of_the_scenes_energies_need_no_further_simulation():
-    for name in ("newton-1", "snug+newton-1", "snug", "untrained", "skinning", "handles-80", "ncs"):
+    for name in ("newton-1", "snug+newton-1", "snug", "skinning", "handles-80", "ncs"):
         assert own_reference(find_method(name)) is None, name
 
 

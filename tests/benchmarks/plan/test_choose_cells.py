@@ -50,7 +50,7 @@ def test_the_reference_comes_first_in_every_scene_and_only_what_has_a_seed_is_re
         if not cell.scene.networks_only:
             first.setdefault(cell.scene.name, cell.method)
     assert set(first.values()) == {"simulation"} and len(first) == 4
-    assert seeds["snug"] == seeds["untrained"] == {3, 5}
+    assert seeds["snug"] == {3, 5}
     assert seeds["simulation"] == seeds["skinning"] == {0}
     alone = planned("full:garments", *TESTS, "--seeds", "3,5", "--set", "one_seed=sn*").cells
     assert {cell.seed for cell in alone if cell.method == "snug"} == {3}

@@ -62,10 +62,10 @@ def assets_of(dressed, motion) -> Assets:
 
 def training(name: str, *motions: str, steps: int, key: str = "0") -> NetworkTraining:
     """The training of a network of the T-shirt."""
-    simulated = name in TRAININGS and TRAININGS[name].simulated
+    simulated = TRAININGS[name].simulated
     return NetworkTraining(
-        network=Network(name, 0, "tshirt"), steps=steps, motions=motions, device="cpu",
-        inputs={"key": key}, key=key, reads=tuple(("data", m) for m in motions if simulated),
+        network=Network(name, 0, "tshirt"), training=TRAININGS[name], steps=steps, motions=motions,
+        device="cpu", inputs={"key": key}, key=key, reads=tuple(("data", m) for m in motions if simulated),
     )  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from benchmarks.methods.declared_networks import TRAININGS
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Network
+from benchmarks.presets import find_preset
 from benchmarks.runner import ground_truth, training_motions
 from benchmarks.runner.ground_truth import simulate_clips
 from benchmarks.runner.networks import train
@@ -31,7 +32,6 @@ from tests.benchmarks.runner.tasks_by_hand import (
     context,
     dressed_scene,
     plan_of,
-    simulated,
     training,
 )
 from tests.snug.training.dressing import swaying, tube_dress
@@ -98,18 +98,6 @@ def test_parts_are_all_clips_once_and_what_is_not_whole_is_left_out(tmp_path, qu
     assert truncated.result["clips"] == ["mixed_0", "mixed_1"]  # it is stopped on purpose
 
 
-@pytest.mark.slow
-def test_a_clip_is_simulated_as_its_motion_would_be(tmp_path):
-    assets = assets_of(tube_dress(), MOTION)
-    clip, *_ = make_shared_clips([MOTION], 1, vertices=150)
-    outcome = clips_of(0, tmp_path, assets, "lbfgs-5")
-    scene = dressed_scene(clip.name).build(assets_of(tube_dress(), clip))
-    trajectory = simulated(scene, method="lbfgs", max_iterations=5, finish=False)
-    positions = read_arrays(tmp_path / outcome.files[0])[clip.name]
-    assert np.array_equal(positions, trajectory.positions.astype(np.float32))
-    assert len(positions) == CLIP_FRAMES
-
-
 def test_a_network_learns_from_given_motions_and_from_the_clips_that_are_there(tmp_path, quickly):
     odd, _ = quickly
     odd["mixed_1"] = lambda clip, entry: dataclasses.replace(still(clip, entry), status="stalled")
@@ -123,6 +111,13 @@ def test_a_network_learns_from_given_motions_and_from_the_clips_that_are_there(t
     assert result["clips_left_out"] == 1 and result["left_out"] == []
     lost = train(task, context(tmp_path, assets), {("data", MOTION.name): done}).result
     assert lost["frames"] == 90
+
+
+def test_sizes_limit_what_is_simulated_and_turned():
+    small, quick = find_preset("small"), find_preset("quick")
+    assert TRAININGS["supervised"].at(small).simulated.mixed == small.simulated_mixed == 0
+    assert TRAININGS["snug"].at(small).recipe.turn == small.turns * 0.2 == 0.1
+    assert all(training.at(quick) == training for training in TRAININGS.values())
 
 
 def test_the_same_simulations_serve_every_seed_and_training(tmp_path, monkeypatch):

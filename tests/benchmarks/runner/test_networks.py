@@ -108,16 +108,16 @@ def test_a_run_from_files_simulates_and_trains_nothing_but_a_users_own(made, tmp
     entry = dataclasses.replace(
         find_method("pbns"), name="mine", trained="mine", training=Training("pbns", PBNS), declared_in=""
     )
-    plan = plan_with(tmp_path, "pbns", "supervised", "untrained", trained=made[0])
+    plan = plan_with(tmp_path, "pbns", "supervised", trained=made[0])
     cell = dataclasses.replace(plan.cells[0], entry=entry)
     tasks = tasks_of(dataclasses.replace(plan, cells=(*plan.cells, cell)))
     kinds = {task.name: task.stage for task in tasks if task.kind == "network"}
     assert kinds == {
         "tshirt/pbns-seed0": "pretrained networks", "tshirt/supervised-seed0": "pretrained networks",
-        "tshirt/untrained-seed0": "training", "tshirt/mine-seed0": "training",
+        "tshirt/mine-seed0": "training",
     }  # fmt: skip
     assert "data" not in {task.kind for task in tasks}
-    trained = tasks_of(plan_with(tmp_path, "pbns", "supervised", "untrained"))
+    trained = tasks_of(plan_with(tmp_path, "pbns", "supervised"))
     assert "data" in {task.kind for task in trained}
 
 
