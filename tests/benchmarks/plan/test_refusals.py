@@ -28,7 +28,6 @@ WORDS = [
     ("--set sizes.frames=2", "sizes.frames: 2: give 3 or more"),
     ("--scenes tshirt/walk", "see test_motions"),
     ("--methods sung", "did you mean snug"),
-    ("--list snugg", "--list snugg: did you mean snug"),
     ("--motions broken.npz", "broken.npz"),
     ("--motions short.npz", "2 frames; at least 3 are needed"),
     ("--motions walk.npz", "the name 'walk' is taken; rename the file"),

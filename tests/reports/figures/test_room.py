@@ -28,7 +28,6 @@ def drawings() -> list[Drawing]:
 
 
 def test_panels_of_many_methods_are_at_least_four_centimetres_wide_and_high(drawings):
-    assert len(drawings) == 3
     for drawing in drawings:
         FigureCanvasAgg(drawing.canvas).draw()
         scale = 2.54 * min(PRINTED, 17.0 / 2.54 / drawing.canvas.get_figwidth()) / drawing.canvas.dpi
