@@ -25,11 +25,14 @@ def regular(path: str | Path) -> Path:
 
 
 def read_toml(path: str | Path) -> dict[str, Any]:
-    """Read a TOML file. Raises OSError, and ValueError as `parse_toml`, without the file's name."""
+    """Read a TOML file. Raises OSError, and ValueError as `parse_toml` or for no field, without its name."""
     path = regular(path)
     if (size := path.stat().st_size) > LARGEST:
         raise ValueError(f"{size} bytes: at most {LARGEST} are read")
-    return parse_toml(path.read_text(encoding="utf-8"))
+    table = parse_toml(path.read_text(encoding="utf-8"))
+    if not table:
+        raise ValueError("holds no field")
+    return table
 
 
 def parse_toml(text: str) -> dict[str, Any]:

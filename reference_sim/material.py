@@ -57,7 +57,10 @@ class Material:
         Raises ValueError that names the file.
         """
         try:
-            return cls(**read_toml(path))
+            table = read_toml(path)
+            if flags := [name for name, value in table.items() if isinstance(value, bool)]:
+                raise ValueError(f"{flags[0]} is true or false, and no number")
+            return cls(**table)
         except FileNotFoundError:
             raise ValueError(f"{path}: no such file") from None
         except (OSError, ValueError, TypeError) as error:  # also of text that is none

@@ -112,7 +112,8 @@ def _demand_one_of(known: tuple[str, ...], name: str, value: object) -> None:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and math.isfinite(value)
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return number and math.isfinite(value)
 
 
 def split_words(text: str) -> tuple[str, dict[str, Any]]:

@@ -29,6 +29,7 @@ from pathlib import Path
 
 from benchmarks import DeclarationError
 from reference_sim import GRAVITY, Material
+from reference_sim.given_files import regular
 
 SNUG = Material()
 SCALED, PRINTED = 1 / 4, 3**0.5 / 2  # rigidity of a plate of equilateral triangles over k of its hinges
@@ -122,7 +123,7 @@ def read_fabrics(path: Path) -> tuple[Fabric, ...]:
         DeclarationError: not understood, a missing column, or a number out of its range; names the line.
     """
     try:
-        rows = path.read_text(encoding="utf-8-sig").splitlines()
+        rows = regular(path).read_text(encoding="utf-8-sig").splitlines()
         delimiter = (
             ";" if rows and ";" in rows[0] else ","
         )  # spreadsheets of half of Europe write 2,1;1,4

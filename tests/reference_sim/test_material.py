@@ -25,6 +25,8 @@ def test_a_file_gives_its_fields_and_the_defaults_of_the_others(tmp_path):
     ("text", "message"),
     [
         (None, "no such file"),
+        ("# lost", "holds no field"),
+        ("density = true", "density is true or false"),
         ("youngs_modulus = 7e4", "unexpected keyword argument 'youngs_modulus'"),
         ("density = '426'", "give fields of Material"),
         ("thickness = nan", "Material.thickness = nan: must be"),

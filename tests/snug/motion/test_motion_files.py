@@ -181,7 +181,6 @@ LYING = {
     "crawls": FLAT | FORWARD | KNEELING,
     "plank": FLAT | FORWARD,
     "lies": {"pelvis": (-np.pi / 2, 0, 0), "left_shoulder": (0, 0, -1.3), "right_shoulder": (0, 0, 1.3)},
-    "swims": FLAT | {"left_shoulder": (0, 0, 1.2), "right_shoulder": (0, 0, -1.2)},
     "handstand": {"pelvis": (0, 0, np.pi), "left_shoulder": (0, 0, 1.6), "right_shoulder": (0, 0, -1.6)},
 }
 
