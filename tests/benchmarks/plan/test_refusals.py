@@ -31,7 +31,7 @@ WORDS = [
     ("--motions broken.npz", "broken.npz"),
     ("--motions short.npz", "2 frames; at least 3 are needed"),
     ("--motions walk.npz", "the name 'walk' is taken; rename the file"),
-    ("--motions back.npz,up=z", "stands along z in 0 % of the frames only"),
+    ("--motions back.npz,up=x", "up=x: choose from y, z"),
     ("--out full", "holds no run"),
     ("--out torn", "torn/run.json: not readable"),
     ("--trained none", "no such folder"),
