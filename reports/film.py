@@ -18,7 +18,6 @@ from reports.pictures import AZIMUTH, BODY_COLOUR, CLOTH_COLOUR, INK, PAPER, Sce
 
 EXAMPLES = """examples:
   python -m reports.film reports/runs/NAME --scene tshirt/kick --methods simulation,snug -o kick.gif
-  python -m reports.film reports/runs/NAME --scene tshirt/punch --methods snug,pbns --speed 0.25 -o punch.gif
   python -m reports.film reports/runs/NAME --scene tshirt/kick --methods simulation,mine -o kick.png
   python -m reports.film reports/runs/NAME --scene tshirt/kick --methods snug -o kick.pc2
 

@@ -226,8 +226,9 @@ def excess_by_motion(run: Run) -> Drawing | None:
     labels = [run.label(name) + f", {garment}" * several for garment, name in medians.index]
     figure = new_figure(PAGE_WIDTH, max(ROW * min(len(medians), MOST_ROWS), PANEL) + 0.6)
     axes = figure.add_subplot(xlabel="relative excess [%]")
-    axes.set_xscale("symlog", linthresh=10.0)
-    axes.xaxis.set_major_formatter(lambda value, _: power_text(value))
+    axes.set_xscale("symlog", linthresh=10.0, subs=(2, 5) if excesses.max() < 200.0 else (3,))
+    for set_formatter in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
+        set_formatter(lambda value, _: power_text(value))
     axes.grid(True, axis="x", color=GRID, linewidth=0.6)
     for place, (key, median) in enumerate(medians[:MOST_ROWS].items()):
         values, colour = excesses[key], style(run, key[1]).colour
