@@ -112,8 +112,9 @@ def _demand_one_of(known: tuple[str, ...], name: str, value: object) -> None:
 
 
 def _is_number(value: object) -> bool:
-    number = isinstance(value, int | float) and not isinstance(value, bool)
-    return number and math.isfinite(value)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return math.isfinite(value)
 
 
 def split_words(text: str) -> tuple[str, dict[str, Any]]:
