@@ -2,8 +2,8 @@
 
 False alarms: a noisy copy of the run has other seeds (the values of each network, on a scale of
 logarithms, are drawn anew with the scatter that its seeds have, half of the variance alike in all
-motions), other members of the reference's ensemble, and times that scatter by 5 %. Misses: such a copy
-with one planted regression.
+motions), other members of the reference's ensemble, times that scatter by 5 %, and one slow
+frame. Misses: such a copy with one planted regression.
 """
 
 from __future__ import annotations
@@ -71,6 +71,7 @@ class NoisyCopies:
             values[group.places] = np.exp(new) if group.positive else new
         unsure = self.rows["uncertainty"].fillna(0.0).to_numpy(dtype=float)[self.unseeded]
         values[self.unseeded] += unsure * random.standard_normal(self.unseeded.sum())
+        values[random.choice(np.flatnonzero(self.rows["metric"] == "cost/frame_worst"))] *= 5.0
         return self.rows.assign(value=values)
 
 
@@ -87,7 +88,10 @@ def planted(rows: pd.DataFrame, random: np.random.Generator) -> tuple[str, str, 
     of_network, of_scene = rows["method"] == network, rows["scene"] == scene
     strain, time = rows["metric"] == "energy/strain", rows["metric"].isin(["cost/frame", "cost/whole"])
     slow = rows["method"].isin(["simulation", "skinning"])
+    correlation = rows["metric"].str.endswith("correlation")
     kinds = {
+        "correlations of the other sign": (of_network & correlation, -1.0),
+        "strain x 3 on all motions, all that is unsure x 100": (of_network & strain, 3.0),
         "strain x 3 on one motion": (of_network & of_scene & strain, 3.0),
         "strain x 10 on one motion": (of_network & of_scene & strain, 10.0),
         "strain x 1.5 on all motions": (of_network & strain, 1.5),
@@ -101,7 +105,10 @@ def planted(rows: pd.DataFrame, random: np.random.Generator) -> tuple[str, str, 
     place = f"{network} in {scene}"
     if factor == 0.0:
         return name, place, rows[~where]
-    return name, place, rows.assign(value=rows["value"].where(~where, factor * rows["value"]))
+    worse = rows.assign(value=rows["value"].where(~where, factor * rows["value"]))
+    if "unsure" in name:
+        worse["uncertainty"] *= 100.0
+    return name, place, worse
 
 
 def main(folder: str, copies: int, seed: int = 0) -> None:
