@@ -21,7 +21,6 @@ from snug.recipe import DEFAULT
 
 if TYPE_CHECKING:
     from benchmarks.metric import Floats, Positions, RollOut, SceneRollOuts
-    from benchmarks.scene import BuiltScene
     from snug.recipe import Recipe
 
 NAME = "own_excess/total"
@@ -36,7 +35,9 @@ def measure(roll_out: RollOut) -> dict[str, float]:
     least = None if recipe in (None, DEFAULT) else _least(roll_out, recipe)
     if bare is None or recipe is None or least is None:
         return {}
-    terms = energy_series(_scene_of(group.scene, recipe), [roll_out.positions, least, bare])
+    from benchmarks.methods.reference_variants import of_own_energies  # loads torch
+
+    terms = energy_series(of_own_energies(group.scene, recipe), [roll_out.positions, least, bare])
     series = [of["total"] if "inertia" in recipe.terms else of["total"] - of["inertia"] for of in terms]
     return _share(series, roll_out.judged_beside(least))
 
@@ -48,12 +49,6 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
         return {}
     series = [energies(roll_out)["total"], energies(reference)["total"], bare]
     return _share(series, roll_out.judged_beside(reference.positions))
-
-
-def _scene_of(scene: BuiltScene, recipe: Recipe) -> BuiltScene:
-    from benchmarks.methods.reference_variants import of_own_energies  # loads torch
-
-    return of_own_energies(scene, recipe)
 
 
 def _least(roll_out: RollOut, recipe: Recipe) -> Positions | None:

@@ -133,7 +133,8 @@ def expanded(patterns: Sequence[str], motions: Motions) -> list[str]:
             expansions.append(pattern)
             continue
         garment = pattern.partition("/")[0].removeprefix("!")
-        names = motions.measured_of(garment) if place[1] == "motion" else motions.dynamic_measured
+        roles = motions.roles(dynamic=True) if place[1] == "swinging" else motions.by_role(garment)
+        names = roles[motions.split][: motions.few]
         if place[2]:
             names = names[int(place[2]) - 1 : int(place[2])]
         expansions += [pattern.replace(place[0], name) for name in names]

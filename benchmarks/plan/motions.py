@@ -20,12 +20,13 @@ from snug.motion.library import (
 
 @dataclass(frozen=True)
 class Motions:
-    """Names of the motions of a run by their roles; garments that swing have others of the library.
+    """Names of the motions of a run by their roles.
 
     files: those that came from a user's files. worn: the garments of the run; the first is that of a run
     where none is named. split: the role whose motions stand in the suites' scenes, "test" or
     "validation".
     few: so many of them, the first, stand there; None: all.
+    dynamic: of garments that swing, those that validate and those that test.
     """
 
     train: tuple[str, ...] = ()
@@ -35,21 +36,17 @@ class Motions:
     worn: tuple[GarmentScenes, ...] = GARMENT_SCENES
     split: str = "test"
     few: int | None = None
+    dynamic: tuple[tuple[str, ...], ...] = (DYNAMIC_VALIDATION, DYNAMIC_TEST)
 
     def roles(self, *, dynamic: bool = False) -> dict[str, tuple[str, ...]]:
         """Return role -> names of the motions, or of those of garments that swing."""
-        validation, test = (DYNAMIC_VALIDATION, DYNAMIC_TEST) if dynamic else (self.validation, self.test)
+        validation, test = self.dynamic if dynamic else (self.validation, self.test)
         return {"train": self.train, "validation": validation, "test": test}
 
     @property
     def measured(self) -> tuple[str, ...]:
         """Those of the split."""
         return self.roles()[self.split][: self.few]
-
-    @property
-    def dynamic_measured(self) -> tuple[str, ...]:
-        """The same for garments that swing."""
-        return self.roles(dynamic=True)[self.split][: self.few]
 
     def role_of(self, motion: str) -> str:
         """Return its role: "training", "validation", "test", or empty where it has none in this run."""
@@ -101,6 +98,7 @@ def split_motions(study: Study, files: Collection[str] = ()) -> Motions:
                 raise StudyError(f"{role}_motions: '{name}' is a test motion; choose others")
         roles[role] = tuple(name for name in names if name in chosen)
     test, validation = roles["test"], roles["validation"]
+    dynamic = (validation or DYNAMIC_VALIDATION, test or DYNAMIC_TEST)
     if library:
         test = test or TEST
         validation = validation or tuple(name for name in VALIDATION if clip_of(name) not in tested)
@@ -111,7 +109,8 @@ def split_motions(study: Study, files: Collection[str] = ()) -> Motions:
     split, sizes = study.split, study.sizes
     # Whoever names motions means all of them, whatever the sizes.
     few = None if getattr(study, f"{split}_motions") else sizes.test_motions
-    motions = Motions(train[: sizes.train_motions], test, validation, tuple(files), split=split, few=few)
+    train = train[: sizes.train_motions]
+    motions = Motions(train, test, validation, tuple(files), split=split, few=few, dynamic=dynamic)
     if not motions.measured:
         raise StudyError(f"split: no motion has this role; name some by {split}_motions")
     return motions

@@ -256,7 +256,7 @@ def read_files(study: Study, scenes: Sequence[Scene] = ()) -> ReadStudy:
     roles, dynamic = motions.roles(), motions.roles(dynamic=True)
     measured = all_scenes(
         dict.fromkeys((*motions.measured, *roles["test"], *roles["validation"])),
-        dict.fromkeys((*motions.dynamic_measured, *dynamic["test"], *dynamic["validation"])),
+        (*dynamic["test"], *dynamic["validation"]),
         motions.worn,
     )
     known = by_name("scene", (*measured.values(), *scenes, *user_scenes))

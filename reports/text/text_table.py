@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from reports.finished_run import Run
 from reports.sentences import TRAINED, headline
 from reports.statistics.effects import Effect
-from reports.tables.table import DASH, REMARKS, CellText, Table, column_texts
+from reports.tables.table import DASH, REMARKS, Table, column_texts
 
 MARKS = "*†"  # of numbers that lack something
 
@@ -32,15 +32,12 @@ def text_rows(run: Run, table: Table, columns: Sequence[str] = ()) -> list[list[
         column, cells = table.columns[place], [row[place] for row in table.rows]
         printed = column_texts(run, column, cells)
         heading = f"{column.title} [{column.unit_above}]" if column.unit_above else column.title
-        texts.append([heading, *(cell["text"].strip() + _marks(cell) for cell in printed)])
+        # What an interval covers is not marked, it has a column.
+        marks = ["".join(mark for mark in cell["mark"] if mark in MARKS) for cell in printed]
+        texts.append([heading, *(c["text"].strip() + m for c, m in zip(printed, marks))])
         if any(isinstance(cell, Effect) and cell.interval for cell in cells):
             texts.append(["Interval", *(cell["spread"] or DASH for cell in printed)])
     return [list(line) for line in zip(*(column for column in texts if set(column[1:]) - {DASH}))]
-
-
-def _marks(cell: CellText) -> str:
-    """Return the marks of a cell; what an interval covers is not marked, it has a column."""
-    return "".join(mark for mark in cell["mark"] if mark in MARKS)
 
 
 def remarks_on(rows: Sequence[Sequence[str]]) -> str:

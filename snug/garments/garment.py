@@ -44,7 +44,6 @@ class Garment:
             front-most first.
         pins: (P,), ascending: vertices that the body carries, of a waistband, since contact without
             friction does not hold it.
-        parameters: of the tailoring.
         material: of the cloth.
         rest_uv: (F,3,2) [m] of the faces' corners, the flat rest state of a garment that has one; else
             rest_positions is its rest shape too. Areas, masses and hinges all come from one of the two.
@@ -57,7 +56,6 @@ class Garment:
     skinning_weights: Array
     loops: Mapping[str, Index] = field(default_factory=dict)
     pins: Index = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    parameters: Mapping[str, float] = field(default_factory=dict)
     material: Material = field(default_factory=Material)
     rest_uv: Array | None = None
 

@@ -108,7 +108,7 @@ class GarmentTemplate:
             share = np.clip(above / SMOOTHED_OVER + 0.5, 0.0, 1.0)[:, None]
             weights = share * borrowed + (1 - share) * weights
         pins = np.sort(loops.get("waist", np.empty(0, dtype=np.int64)))
-        return Garment(self.name, positions, faces, nearest, weights, loops, pins, parameters=cut)
+        return Garment(self.name, positions, faces, nearest, weights, loops, pins)
 
 
 def _sleeves(body: Body, cut: Measures, end: str = "left_elbow") -> Outline:

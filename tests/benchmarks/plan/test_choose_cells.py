@@ -13,7 +13,7 @@ from benchmarks.plan.plan import make_plan
 from benchmarks.plan.study import StudyError, read_study
 from benchmarks.presets import find_preset
 from benchmarks.scenes import GARMENT_SCENES
-from snug.motion.library import DYNAMIC_TEST
+from snug.motion.library import DYNAMIC_TEST, TEST, TRAIN, VALIDATION
 from tests.benchmarks.plan.planned import planned, study_with
 
 SMOKE = find_preset("smoke")
@@ -100,13 +100,14 @@ def test_what_no_part_lists_is_met_by_its_whole_name():
 
 
 def test_motions_are_divided_as_help_says():
-    from snug.motion.library import TEST, TRAIN, VALIDATION
-
     assert len(divided(sizes="paper").measured) == 22
     library = divided()
     assert (library.train, library.validation, library.test) == (TRAIN, VALIDATION, TEST)
     assert library.files == () and library.measured == TEST[:8]
+    assert library.measured_of("skirt") == DYNAMIC_TEST
     moved = divided(test_motions=["walk", "kick"])
+    assert moved.measured_of("skirt") == moved.measured_of("dress") == moved.test
+    assert moved.by_role("skirt")["validation"] == library.by_role("skirt")["validation"]
     assert set(moved.test) == {"walk", "kick"} and "kick" not in moved.validation
     assert not {"walk", *VALIDATION, *TEST} & set(moved.train)
     assert not {"05_02_b", "05_02_c"} & set(divided(test_motions=["05_02_a"]).validation)
@@ -140,8 +141,6 @@ def test_a_published_split_divides_the_motions():
 
 
 def test_a_recipe_is_never_chosen_by_the_test_motions():
-    from snug.motion.library import TEST, VALIDATION
-
     ablations = read_study("ablations")
     assert ablations.split == "validation" and not ablations.test_motions
     motions = split_motions(ablations)
