@@ -20,6 +20,7 @@ from reports.pictures import side_by_side
 from reports.tables.table import Table
 
 ROWS, COLUMNS = 12, 9  # of a printed table; columns of numbers; the CSV has all
+OF_GARMENT = 7  # rows of each garment
 LETTERS = 90  # of a reason at the end of its rows
 
 
@@ -63,7 +64,8 @@ class TableBlock:
         heads = [place for place, column in enumerate(table.columns) if column.name in table.grouped_by]
         groups = pd.Series([" · ".join(str(row[place]) for place in heads) for row in rows], dtype=str)
         order = groups.groupby(groups).cumcount().sort_values(kind="stable")
-        rows = [rows[line] for line in sorted(order.index[: self.most])]
+        least = OF_GARMENT * groups.nunique() * (table.grouped_by == ("garment",))
+        rows = [rows[line] for line in sorted(order.index[: max(self.most, least)])]
         numbers = [place for place, column in enumerate(table.columns) if not column.text]
         places = [place for place in range(len(table.columns)) if place not in numbers[COLUMNS:]]
         counts = {"rows": len(table.rows) - len(rows), "columns": len(table.columns) - len(places)}

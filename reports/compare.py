@@ -60,7 +60,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         changes = [c for c in changes if c.verdict == WORSE and c.metric not in HEADLINE]
     for change in changes[: MOST_CHANGES if short else None]:
         print(f"{change.verdict:8}{change.place}  {change.method}  {change.metric}  {change.size}")
-    print("\n".join(_summary(comparison, (one, other))))
+    order = (GONE, WORSE, BETTER, OTHER)
+    counts = [f"{sum(c.verdict == v for c in comparison.changes)} {v}" for v in order]
+    print(f"{comparison.compared} means compared: {', '.join(counts)}.")
+    machines = [", ".join(sorted({*run.frame["hardware"]})) for run in (one, other)]
+    if machines[0] != machines[1]:
+        print(f"No times compared: A ran on {machines[0]}, B on {machines[1]}.")
     if short and comparison.changes:
         print("Each change: --metrics '*'")
     return 1 if any(change.verdict in FAILING for change in comparison.changes) else 0
@@ -99,15 +104,6 @@ def _headline(comparison: Comparison, run: Run) -> Iterator[str]:
     yield markdown_table([["Method", *heads], *rows[:MOST_METHODS]])
     if (rest := len(rows) - MOST_METHODS) > 0:
         yield f"{rest} more methods: --methods '*'"
-
-
-def _summary(comparison: Comparison, runs: Sequence[Run]) -> Iterator[str]:
-    order = (GONE, WORSE, BETTER, OTHER)
-    counts = [f"{sum(c.verdict == v for c in comparison.changes)} {v}" for v in order]
-    yield f"{comparison.compared} means compared: {', '.join(counts)}."
-    machines = [", ".join(sorted(set(run.frame["hardware"]))) for run in runs]
-    if machines[0] != machines[1]:
-        yield f"No times compared: A ran on {machines[0]}, B on {machines[1]}."
 
 
 if __name__ == "__main__":

@@ -63,8 +63,10 @@ def verdict(run: Run, worn: pd.DataFrame) -> str:
     scenes = set(rows[(rows["metric"] == RELATIVE_EXCESS.name) & rows["usable"]]["scene"])
     removes = excess.typical < 100.0
     share, pooled = (100.0 - x if removes else x for x in (excess.typical, excess.pooled))
+    several = run.garment_rows["garment"].nunique() > 1
+    motion = "motion" + f" of the {run.first_garment}" * several
     text = (
-        f"In {'a typical' if len(scenes) > 1 else 'one'} {_kind(run, scenes)}motion {run.label(name)} "
+        f"In {'a typical' if len(scenes) > 1 else 'one'} {_kind(run, scenes)}{motion} {run.label(name)} "
         f"{'removes' if removes else 'has'} {number(share, 2)} % of the energy that skinning has in excess "
         "of a converged simulation"
     )

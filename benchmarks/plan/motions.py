@@ -26,7 +26,7 @@ class Motions:
     where none is named. split: the role whose motions stand in the suites' scenes, "test" or
     "validation".
     few: so many of them, the first, stand there; None: all.
-    dynamic: of garments that swing, those that validate and those that test.
+    dynamic: of garments that swing, those that validate, and test.
     """
 
     train: tuple[str, ...] = ()

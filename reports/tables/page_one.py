@@ -16,7 +16,7 @@ from reports.statistics.pareto import (
     rivals,
     run_time,
 )
-from reports.statistics.relative_excess import excess_of, own_excess_of, with_relative_excess
+from reports.statistics.relative_excess import SKINNING, excess_of, own_excess_of, with_relative_excess
 from reports.tables.table import Cell, Column, Table, in_scenes, metric_column, scene_in_words, table
 
 ROWS = 8
@@ -55,9 +55,9 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     asked = [(run.metrics[name], rows) for name, rows in wanted if name in run.metrics]
     with_excess = with_relative_excess(run, rows_of_garment)
     excess = {name: excess_of(run, with_excess, name) for name in chosen if name != run.reference}
-    own_excess = {name: own_excess_of(run, rows_of_garment, name) for name in excess}
+    own = {m: own_excess_of(run, rows_of_garment, m) for m in excess if m != SKINNING}
     shares: dict[str, tuple[Cell, Cell]] = {
-        name: (own_excess[name], of.effect) for name, of in excess.items() if of
+        name: (own.get(name, of.effect), of.effect) for name, of in excess.items() if of
     }
     shares |= {run.reference: (0.0, 0.0)} if shares else {}
     lines: list[tuple[Cell, ...]] = [

@@ -33,7 +33,7 @@ def text_rows(run: Run, table: Table, columns: Sequence[str] = ()) -> list[list[
         printed = column_texts(run, column, cells)
         heading = f"{column.title} [{column.unit_above}]" if column.unit_above else column.title
         # What an interval covers is not marked, it has a column.
-        marks = ["".join(mark for mark in cell["mark"] if mark in MARKS) for cell in printed]
+        marks = ["".join(m for m in cell["mark"] if m in MARKS) for cell in printed]
         texts.append([heading, *(c["text"].strip() + m for c, m in zip(printed, marks))])
         if any(isinstance(cell, Effect) and cell.interval for cell in cells):
             texts.append(["Interval", *(cell["spread"] or DASH for cell in printed)])

@@ -199,20 +199,16 @@ def mesh_garment(
             if abs(count - vertices) > max(1, vertices // 100):
                 half += (vertices - count) // 2
                 raise ValueError(f"{count} vertices instead of {vertices}")
-            whole, whole_faces = _mirror(_keep_off(body, points, faces, cuts, clearance), faces)
+            points = _keep_off(body, points, faces, cuts, clearance)
+            seam = points[:, 0] == 0
+            twin = np.where(seam, np.arange(len(points)), len(points) + np.cumsum(~seam) - 1)
+            whole = np.concatenate([points, points[~seam] * [-1.0, 1.0, 1.0]])
+            whole_faces = np.concatenate([faces, twin[faces][:, ::-1]])
             _check_even(whole, whole_faces, openings)
             return whole, whole_faces
         except ValueError as error:
             problem = str(error)
     raise ValueError(f"vertices={vertices}: no sound mesh of this size ({problem}); ask for more")
-
-
-def _mirror(points: Array, faces: Index) -> tuple[Array, Index]:
-    """Return both halves, welded at x = 0."""
-    seam = points[:, 0] == 0
-    twin = np.where(seam, np.arange(len(points)), len(points) + np.cumsum(~seam) - 1)
-    whole = np.concatenate([points, points[~seam] * [-1.0, 1.0, 1.0]])
-    return whole, np.concatenate([faces, twin[faces][:, ::-1]])
 
 
 def _keep_off(body: Body, points: Array, faces: Index, cuts: list[CutPlane], clearance: float) -> Array:
