@@ -7,11 +7,12 @@ from functools import cache, partial
 import numpy as np
 
 import reference_sim as sim
-from benchmarks.meshes import jittered_patch, right_grid
+from benchmarks.meshes import in_space, jittered_patch, right_grid
 from benchmarks.scene import Scene
 from benchmarks.validation.case import known_answer
 from benchmarks.validation.equilibrium import (
     COTTON,
+    border,
     farthest,
     flat_cloth,
     minimum,
@@ -64,6 +65,30 @@ def moving_pins_in_substeps() -> float:
     coarse = run(dt=scene.dt, frames=frames, substeps=steps, pin_positions=lambda n: places + pulled[n])
     fine = run(dt=scene.dt / steps, frames=steps * (frames - 1) + 1, pin_positions=between)
     return farthest(coarse, fine[::steps])
+
+
+@known_answer(expected=0.0, tolerance=1e-8, reason="the mode's own nonlinearity, (pi amplitude)^2")
+def stretched_membrane_vibration() -> float:
+    """Return the largest error of a stretched membrane's lowest mode over 30 steps, over its first amplitude.
+
+    The square of 1 m is held at its border. With stretch s, spacing h and lumped masses
+    S = (lam + mu)(s^2 - 1), omega^2 = (S/rho_a) (4/h^2) 2 sin^2(pi h/2), and the discrete motion of the
+    mode is z_{n+1} = (2 z_n - z_{n-1}) / (1 + omega^2 dt^2).
+    """
+    amplitude, frames, cells, s = 1e-5, 31, 8, 1.2
+    points, faces = right_grid(cells, cells, 1.0, 1.0)
+    cloth = flat_cloth(points, faces, held=border(points))
+    mode = np.sin(np.pi * points[:, 0]) * np.sin(np.pi * points[:, 1])
+    start = s * in_space(points)
+    start[:, 2] = amplitude * mode
+    S = (COTTON.lame_lambda + COTTON.lame_mu) * (s**2 - 1)
+    omega2 = float(S / COTTON.areal_density * 4 * cells**2 * 2 * np.sin(np.pi / (2 * cells)) ** 2)
+    x = motion(cloth, [energies.StretchStVK(cloth)], dt=DT, frames=frames, start=start, tolerance=1e-12)
+    z = [amplitude, amplitude]  # the frame before the start: no velocity
+    for _ in range(frames - 1):
+        z.append((2 * z[-1] - z[-2]) / (1 + omega2 * DT**2))
+    measured = x[:, :, 2] @ mode / (mode @ mode)
+    return float(np.abs(measured - z[1:]).max() / amplitude)
 
 
 @known_answer(expected=0.0, tolerance=2e-6, reason="the residual gradient that the solver may leave")
