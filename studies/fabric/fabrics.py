@@ -29,7 +29,6 @@ from pathlib import Path
 
 from benchmarks import DeclarationError
 from reference_sim import GRAVITY, Material
-from reference_sim.given_files import regular
 
 SNUG = Material()
 SCALED, PRINTED = 1 / 4, 3**0.5 / 2  # rigidity of a plate of equilateral triangles over k of its hinges
@@ -123,10 +122,11 @@ def read_fabrics(path: Path) -> tuple[Fabric, ...]:
         DeclarationError: not understood, a missing column, or a number out of its range; names the line.
     """
     try:
-        rows = regular(path).read_text(encoding="utf-8-sig").splitlines()
-        delimiter = (
-            ";" if rows and ";" in rows[0] else ","
-        )  # spreadsheets of half of Europe write 2,1;1,4
+        if path.exists() and not path.is_file():  # a pipe could be read without end
+            raise OSError("no regular file")
+        rows = path.read_text(encoding="utf-8-sig").splitlines()
+        # Spreadsheets of half of Europe write 2,1;1,4.
+        delimiter = ";" if rows and ";" in rows[0] else ","
         if delimiter == ";" and any("," in row for row in rows[1:]):
             rows[1:] = [row.translate(str.maketrans(",.", ".,")) for row in rows[1:]]
         lines = list(csv.reader(rows, delimiter=delimiter))
