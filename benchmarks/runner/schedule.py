@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from functools import partial
 from itertools import groupby
 from pathlib import Path
@@ -88,8 +89,12 @@ TOGETHER = 12  # cells of one scene that a process measures, beside those that t
 
 
 def tasks_of(plan: Plan) -> list[Task]:
-    """Return every task of the plan. Raises DeclarationError where an entry names a missing module."""
-    return list(Schedule(plan).tasks())
+    """Return every task of the plan. Raises DeclarationError where an entry names a missing module.
+
+    Tasks are expected to take as long as their garments are large.
+    """
+    scale = plan.study.sizes.garment_vertices / 1000
+    return [replace(task, work=scale * task.work) for task in Schedule(plan).tasks()]
 
 
 class Schedule:
