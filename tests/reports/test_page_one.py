@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from reports.sentences import TRAINED, endings, headline
+from reports.sentences import TRAINED, headline
 from reports.statistics.outcomes import leads
 from tests.reports.report_folder import SCENES, all_rows, row, run_of
 from tests.reports.tables.test_tables import on_two_scenes
@@ -50,21 +50,6 @@ def test_a_network_is_compared_with_its_fully_trained_one():
     full = [dataclasses.replace(r, method="snug-packaged") for r in on_two_scenes("snug", 0.6, 7.1)]
     text = said(TRAINED, [*SNUG, *full, *PBNS, *BESIDE])
     assert text == "Relative excess as trained in this run: SNUG 10 %, fully trained 1.0 %."
-
-
-def test_page_one_counts_every_kind_of_ending():
-    rows = [*all_rows(), row("tshirt/walk", "pbns", "energy/bending", status="stalled", reason="a frame")]
-    late = {"status": "timeout", "reason": "over 600 s", "seed": 1}
-    rows.append(row("tshirt/jump", "pbns", "energy/strain", None, **late))
-    assert endings(run_of(rows)).endswith(
-        "cells 2 failed, 1 timeout, 1 stalled; of 3 checks 1 failed; of 2 stress tests 1 timeout."
-    )
-    # A metric that is not finite, or off its tolerance, fails no cell that has others.
-    bad = row("tshirt/walk", "pbns", "gap/energy", None, status="failed", reason="no number")
-    assert "cells 2 failed, 1 timeout, 1 stalled;" in endings(run_of([*rows, bad]))
-    run = run_of(rows[:3])
-    run.problems.append("a file")
-    assert endings(run) == "1 files could not be read."
 
 
 def test_page_one_shows_the_network_the_papers_rival_or_another_and_a_baseline():
