@@ -156,6 +156,8 @@ def _differences(metric: Metric, rows: pd.DataFrame) -> pd.DataFrame:
     else:
         unit = 100.0 if relative else np.maximum(np.abs(old), median)
         least = np.maximum(np.maximum(share * unit, FLOOR * median), moved)
+    # On a scale of logarithms a fall by as much is farther than a rise.
+    least = np.where(np.abs(new - old) <= moved, np.inf, least)
     error = scatter * np.sqrt((1.0 / counts).reshape(-1, 2).sum(axis=1))
     return pd.DataFrame({
         "scene": scenes, "method": rows["method"].iloc[0], "metric": metric.name, "before": old, "after": new,

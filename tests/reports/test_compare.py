@@ -119,6 +119,8 @@ def test_what_the_uncertainty_or_2_percent_covers_is_no_change():
     assert found(a_run(), worse) == [("worse", "tshirt", "simulation", "energy/strain")]
     unsure, both = ([replace(r, uncertainty=0.5) for r in rows] for rows in (a_run(), worse))
     assert found(unsure, both) == []
+    unsure = [replace(r, uncertainty=0.3 * r.value) for r in a_run()]
+    assert found(unsure, [times(0.2, scene=SCENES[0], **SIMULATED)(given) for given in unsure]) == []
     # The later run's own uncertainty hides nothing.
     assert found(a_run(), both) == [("worse", "tshirt", "simulation", "energy/strain")]
 
