@@ -77,11 +77,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if head.endswith("+changes"):
         raise StudyError(f"{head}: commit the changes first, so that a commit says what was run")
     plans = {name: make_plan(with_seeds(name), folder=options.out / Path(name).stem) for name in names}
-    due = [name for name in names if not is_published(TARGET / Path(name).stem, plans[name].study, head)]
+    unpublished = [
+        name for name in names if not is_published(TARGET / Path(name).stem, plans[name].study, head)
+    ]
     for name in names:
-        state = describe(plans[name]).rpartition("\n")[2] if name in due else "is published"
+        state = describe(plans[name]).rpartition("\n")[2] if name in unpublished else "is published"
         print(f"{name}: {state}", file=sys.stderr, flush=True)
-    for name in due:  # where one is not published, the next is done all the same
+    for name in unpublished:  # where one is not published, the next is done all the same
         try:
             publish(name, options.out, TARGET, head)
         except ValueError as error:  # of the run's command, of files of results
@@ -153,10 +155,9 @@ def publish(name: str, out: Path, into: Path, head: str) -> None:
     """
     show, whole = read_study(name).show, out / Path(name).stem
     assert show is not None
-    seeds = ["--seeds", ",".join(map(str, show.seeds))] if show.seeds else []
-    _call(
-        "benchmarks.run", name, *seeds, "--retry", "-o", str(whole)
-    )  # as a task that lacked memory once
+    seeds = ["--seeds", ",".join(map(str, show.seeds))] if show.seeds else []  # see with_seeds
+    # Again what has failed, as a task that lacked memory once.
+    _call("benchmarks.run", name, *seeds, "--retry", "-o", str(whole))
     if not all_usable(RunFolder(whole)):
         raise ResultsError(f"{whole}: has failed")
     if others := sorted({row.commit for row in RunFolder(whole).read_rows()} - {head, ""}):

@@ -34,10 +34,11 @@ TRAININGS = {
     "pbns-springs": Training("pbns", PBNS_SPRINGS),
     **{f"snug-{recipe.name}": Training("snug", recipe) for recipe in (*PAPERS, *ABLATIONS)},
 }
+IN_PACKAGE = trained_networks()
 TRAININGS |= {
-    f"{name}-packaged": replace(TRAININGS[name], packaged=name)
-    for name in (*TRAININGS,)
-    if network_name(name, "tshirt", 0) in trained_networks()
+    f"{name}-packaged": replace(training, packaged=name)
+    for name, training in TRAININGS.items()
+    if network_name(name, "tshirt", 0) in IN_PACKAGE
 }
 
 

@@ -183,7 +183,7 @@ def describe(plan: Plan) -> str:
     """Return the plan in a few lines, and one line for each task. Starts nothing, writes nothing."""
     folder = RunFolder(plan.folder / "none" if plan.fresh else plan.folder)
     study, skipped, stage = plan.study, sum(not runs(cell) for cell in plan.cells), ""
-    due: list[Task] = []
+    tasks_to_run: list[Task] = []
     lines = [
         f"preset {study.sizes.name}: {study.sizes.description}",
         f"folder {plan.folder}",
@@ -200,6 +200,6 @@ def describe(plan: Plan) -> str:
         state = "run" if outcome is None else "cached" if outcome.content else "skip"
         lines.append(f"  {task.title}: {state}" + f" ({why})" * bool(why))
         counts[state] += 1
-        due += [task] * (state == "run")
-    time_left = Progress(due, plan.workers).time_left()
+        tasks_to_run += [task] * (state == "run")
+    time_left = Progress(tasks_to_run, plan.workers).time_left()
     return "\n".join([*lines, f"{counts['run']} tasks to run, {time_left}; {counts['cached']} cached"])
