@@ -16,7 +16,7 @@ import pandas as pd
 from reports.figures.charts import energy_series, error_of_page_one, excess_by_motion
 from reports.figures.plotting import Figure, Picture
 from reports.finished_run import Run
-from reports.pictures import side_by_side
+from reports.pictures import side_by_side, worst_frame
 from reports.tables.table import Table
 
 ROWS, COLUMNS = 12, 9  # of a printed table; columns of numbers; the CSV has all
@@ -97,6 +97,7 @@ BLOCKS: tuple[Heading | Figure | TableBlock, ...] = (
     Heading("Findings"),
     TableBlock("relative_excess"),
     Figure("excess_by_motion", excess_by_motion),
+    Figure("worst_frame", worst_frame),
     TableBlock("excess_by_time_step"),
     TableBlock("errors_in_spreads"),
     TableBlock("reference_uncertainty"),

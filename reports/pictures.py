@@ -15,7 +15,7 @@ from scipy.ndimage import uniform_filter1d
 from reference_sim.trajectory import Trajectory
 from reports.figures.plotting import DOTS, PAGE_WIDTH, Drawing, file_name, new_figure
 from reports.finished_run import Run, shown_seeds
-from reports.statistics.outcomes import leads
+from reports.statistics.outcomes import LEARNED, leads
 from reports.tables.table import scene_in_words
 
 BODY_COLOUR = (0.80, 0.77, 0.74)
@@ -238,21 +238,46 @@ def side_by_side(run: Run) -> Drawing | None:
 
     Those that ended early are left out.
     """
-    rows = run.garment_rows[run.garment_rows["metric"] == "energy/total"]
+    rows = run.garment_rows
     for scene in [scene for scenes in run.garments(rows).values() for scene in scenes]:
-        seeds = shown_seeds(rows[rows["scene"] == scene]).loc[scene]
-        names = leads(run, rows[rows["scene"] == scene])
-        cloths = {name: run.roll_outs.cloth(scene, name, int(seeds[name])) for name in names}
-        most = max((cloth.frames for cloth in cloths.values() if cloth), default=0)
-        whole = {name: cloth for name, cloth in cloths.items() if cloth and cloth.frames == most}
-        if whole:
-            labels = {name: run.label(name) for name in whole}
-            return _still(SceneRollOuts(scene, whole, run.roll_outs.body(scene), labels))
+        if selected := _whole(run, scene):
+            return _still(selected, *selected.lively_frame())
     return None
 
 
-def _still(selected: SceneRollOuts) -> Drawing:
-    frame, why = selected.lively_frame()
+def worst_frame(run: Run) -> Drawing | None:
+    """Draw the methods of page one where its first network has most energy above the reference's.
+
+    The frame is that of all motions of garments, by frame_energies.csv; None where it has no roll-outs.
+    """
+    rows = run.garment_rows
+    network = next((name for name in leads(run, rows) if run.methods[name].role in LEARNED), "")
+    frames = run.frame_energies[run.frame_energies["scene"].isin(set(rows["scene"]))]
+    totals = frames.pivot_table("total", ["scene", "seconds"], "method", "first")  # of the first seed
+    if not {network, run.reference} <= set(totals):
+        return None
+    above = (totals[network] - totals[run.reference]).dropna()
+    scene, seconds = above.idxmax()
+    if not (selected := _whole(run, scene)):
+        return None
+    frame = int(np.argmin(np.abs(selected.longest.times - seconds)))
+    why = f"where {run.label(network)} has most energy above the reference, {above.max():.2g} J"
+    return _still(selected, frame, why, "worst_frame")
+
+
+def _whole(run: Run, scene: str) -> SceneRollOuts | None:
+    """Select the roll-outs of page one's methods that came to the end of the scene; None without any."""
+    rows = run.garment_rows
+    rows = rows[(rows["metric"] == "energy/total") & (rows["scene"] == scene)]
+    seeds = shown_seeds(rows).get(scene, {})
+    cloths = {name: run.roll_outs.cloth(scene, name, int(seeds[name])) for name in leads(run, rows)}
+    most = max((cloth.frames for cloth in cloths.values() if cloth), default=0)
+    whole = {name: cloth for name, cloth in cloths.items() if cloth and cloth.frames == most}
+    labels = {name: run.label(name) for name in whole}
+    return SceneRollOuts(scene, whole, run.roll_outs.body(scene), labels) if whole else None
+
+
+def _still(selected: SceneRollOuts, frame: int, why: str, name: str = "") -> Drawing:
     width = PAGE_WIDTH / min(len(selected.series), PER_ROW) * DOTS
     (image,) = draw_frames(selected, round(min(width, WIDEST * DOTS)), AZIMUTH, [frame])
     high, wide = image.shape[:2]
@@ -262,4 +287,4 @@ def _still(selected: SceneRollOuts) -> Drawing:
     axes.imshow(image, interpolation="none")
     axes.set_axis_off()
     caption = f"{scene_in_words(selected.scene)}: frame {frame}, {why}."
-    return Drawing(figure, f"frames_{file_name(selected.scene)}", caption, vector=False)
+    return Drawing(figure, name or f"frames_{file_name(selected.scene)}", caption, vector=False)

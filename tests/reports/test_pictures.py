@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
+import pandas as pd
 import pytest
 from PIL import Image
 
@@ -12,7 +15,7 @@ from reference_sim.files.mesh_files import read_mesh
 from reference_sim.trajectory import read_point_cache
 from reports import film, pictures
 from reports.finished_run import read_run
-from reports.pictures import Camera, camera_axes, side_by_side
+from reports.pictures import Camera, camera_axes, side_by_side, worst_frame
 from tests.reports.report_folder import FRAMES, row, run_folder, sheet, write_mesh
 
 SCENE = "tshirt/walk"
@@ -37,6 +40,14 @@ def test_the_still_has_what_came_to_its_end_at_the_liveliest_frame(run):
     drawing = side_by_side(read_run(run))
     assert drawing.caption.startswith("tshirt: walk: frame 3, where ")
     assert drawing.canvas.get_figwidth() == pytest.approx(2 * pictures.WIDEST, abs=0.1)
+
+
+def test_the_worst_frame_is_where_the_network_lies_farthest_above_the_reference(run):
+    lines = [(SCENE, name, 0, t / 30, e) for name, own in {"simulation": [5, 1, 0], "snug": [6, 4, 1]}.items()
+             for t, e in enumerate(own)]  # fmt: skip
+    frames = pd.DataFrame(lines, columns=["scene", "method", "seed", "seconds", "total"])
+    caption = worst_frame(replace(read_run(run), frame_energies=frames)).caption
+    assert "frame 1, where SNUG has most energy above the reference, 3 J" in caption
 
 
 def test_a_view_shows_the_nearer_surface_and_what_lies_behind_around_it():
