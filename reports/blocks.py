@@ -100,7 +100,6 @@ BLOCKS: tuple[Heading | Figure | TableBlock, ...] = (
     Figure("worst_frame", worst_frame),
     TableBlock("excess_by_time_step"),
     TableBlock("errors_in_spreads"),
-    TableBlock("reference_uncertainty"),
     TableBlock("findings", left_out=("exploratory", "inconclusive: one seed")),
     TableBlock("ablation_effects"),
     Heading("Dynamics"),

@@ -246,14 +246,15 @@ def side_by_side(run: Run) -> Drawing | None:
 
 
 def worst_frame(run: Run) -> Drawing | None:
-    """Draw the methods of page one where its first network has most energy above the reference's.
+    """Draw the methods of page one in the frame, of all motions, in which its network is worst.
 
-    The frame is that of all motions of garments, by frame_energies.csv; None where it has no roll-outs.
+    It has most energy above the reference there.
     """
     rows = run.garment_rows
     network = next((name for name in leads(run, rows) if run.methods[name].role in LEARNED), "")
     frames = run.frame_energies[run.frame_energies["scene"].isin(set(rows["scene"]))]
-    totals = frames.pivot_table("total", ["scene", "seconds"], "method", "first")  # of the first seed
+    # Of the first seed.
+    totals = frames.pivot_table("total", ["scene", "seconds"], "method", "first")
     if not {network, run.reference} <= set(totals):
         return None
     above = (totals[network] - totals[run.reference]).dropna()
@@ -261,12 +262,12 @@ def worst_frame(run: Run) -> Drawing | None:
     if not (selected := _whole(run, scene)):
         return None
     frame = int(np.argmin(np.abs(selected.longest.times - seconds)))
-    why = f"where {run.label(network)} has most energy above the reference, {above.max():.2g} J"
-    return _still(selected, frame, why, "worst_frame")
+    why = f"where {run.label(network)} has most energy above the reference"
+    return _still(selected, frame, f"{why}, {above.max():.2g} J", "worst_frame")
 
 
 def _whole(run: Run, scene: str) -> SceneRollOuts | None:
-    """Select the roll-outs of page one's methods that came to the end of the scene; None without any."""
+    """Return page one's methods that came to the scene's end; None without any."""
     rows = run.garment_rows
     rows = rows[(rows["metric"] == "energy/total") & (rows["scene"] == scene)]
     seeds = shown_seeds(rows).get(scene, {})

@@ -3,7 +3,7 @@
 A network is tested in each scene over its seeds. Three seeds say little of their scatter, so the scatter
 is pooled over the scenes of the method. A scene that scatters more has its own; one that scatters far more
 stays out of the pool. The test is Student's with the pooled degrees of freedom, by Bonferroni for all these
-tests. A method without seeds is compared with the noise of the reference.
+tests, and so is the normal quantile of the reference's noise, with which a method without seeds is compared.
 """
 
 from __future__ import annotations
@@ -111,10 +111,11 @@ def changed_scenes(one: pd.DataFrame, other: pd.DataFrame, metrics: dict[str, Me
     frame = frame[~frame["seeded"] | (seeds > 1)]
     if frame.empty:
         return []
+    level = LEVEL / 2.0 / len(frame.drop_duplicates([*NETWORK_METRIC, "scene"]))
+    spreads = max(float(stats.norm.isf(level)), SPREADS)
     groups = frame.groupby(NETWORK_METRIC, sort=False)
-    rows = pd.concat([_differences(metrics[name], of_group) for (_, name), of_group in groups])
-    tests = max(int((rows["error"] > 0.0).sum()), 1)
-    beyond = rows["error"] * stats.t.isf(LEVEL / 2.0 / tests, rows["freedom"])
+    rows = pd.concat([_differences(metrics[name], of_group, spreads) for (_, name), of_group in groups])
+    beyond = rows["error"] * stats.t.isf(level, rows["freedom"])
     rows = rows[rows["far"].abs() > np.maximum(rows["least"], beyond)]
     return [
         Change(
@@ -125,12 +126,12 @@ def changed_scenes(one: pd.DataFrame, other: pd.DataFrame, metrics: dict[str, Me
     ]  # fmt: skip
 
 
-def _differences(metric: Metric, rows: pd.DataFrame) -> pd.DataFrame:
+def _differences(metric: Metric, rows: pd.DataFrame, spreads: float) -> pd.DataFrame:
     """Return for each scene of one method the difference of the later run from the earlier.
 
     before, after: means over seeds. far: the difference on the scale, of logarithms where all values are
-    positive, else plain. least: the largest one on that scale that is no change. error: its standard
-    error, 0 without seeds. freedom: degrees of freedom of the error.
+    positive, else plain. least: the largest one on that scale that is no change, at least `spreads` times
+    the noise. error: its standard error, 0 without seeds. freedom: degrees of freedom of the error.
     """
     values, run = rows["value"].to_numpy(), rows["run"].to_numpy()
     relative = metric.name.startswith("relative_excess/")
@@ -149,7 +150,7 @@ def _differences(metric: Metric, rows: pd.DataFrame) -> pd.DataFrame:
     draws = pd.factorize(rows["seed"] * 2 + run)[0]
     scatter, freedom = _scatter(scaled - np.stack([before, after])[run, places], places, draws)
     median = float(np.median(np.abs(old)))
-    moved = SPREADS * np.hypot(*means_of(rows["uncertainty"].fillna(0.0).to_numpy()))
+    moved = spreads * np.hypot(*means_of(rows["uncertainty"].fillna(0.0).to_numpy()))
     share = tolerance_of(metric)
     if positive:
         least = np.maximum(math.log1p(share), np.log1p((FLOOR * median + moved) / old))

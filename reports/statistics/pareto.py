@@ -115,7 +115,7 @@ def indistinct(run: Run, rows: pd.DataFrame, metric: str) -> float:
     """Return the error [unit of the metric] below which a method cannot be told from the reference.
 
     It is the error of the reference's twin from another start, the mean of scenes; of the energy gap what
-    the reference leaves on contact planes searched at its end. 0 where none is known.
+    the reference leaves on planes searched at its end. 0 where none is known.
     """
     if metric in PLANES:
         kept = rows[
@@ -184,13 +184,3 @@ def compared_scenes(run: Run, frame: pd.DataFrame) -> list[str]:
     rows = timed[timed["scene"].isin(both)]
     of_speed = rows[rows["suite"] == "speed"]
     return next(iter(run.garments(of_speed if len(of_speed) else rows).values()), [])
-
-
-def reference_scenes(run: Run) -> list[str]:
-    """Return the scenes of the first garment in which references are compared with each other.
-
-    Those of suite speed in which SNUG was timed beside a truncated solver; without any, all whole
-    motions.
-    """
-    clips = compared_scenes(run, run.cells("speed"))
-    return clips or next(iter(run.garments(run.garment_rows).values()), [])

@@ -17,7 +17,7 @@ from reports.tables.findings import (
     unfinished,
     validation,
 )
-from reports.tables.page_one import overview, reference_uncertainty
+from reports.tables.page_one import overview
 from reports.tables.paper_tables import paper_tables
 from reports.tables.pivots import ablation_effects, metric_tables, shapes
 from reports.tables.table import Table
@@ -30,7 +30,6 @@ TABLES: tuple[Callable[[Run], list[Table]], ...] = (
     errors_in_spreads,
     findings,
     ablation_effects,
-    reference_uncertainty,
     shapes,
     validation,
     extremes,

@@ -101,7 +101,7 @@ def relative_excess(run: Run) -> list[Table]:
 
 
 def _by_time_step(run: Run, excesses: Mapping[tuple[str, str], Excess]) -> list[Table]:
-    """Tabulate the typical relative excess, (garment, method) -> one, against each smaller time step."""
+    """Tabulate typical relative excesses by garment and method against each smaller time step."""
     members = [name for name in run.reference_family if name not in STARTS[1]]
     lines: list[tuple[Cell, ...]] = []
     for key, excess in excesses.items():
@@ -114,8 +114,8 @@ def _by_time_step(run: Run, excesses: Mapping[tuple[str, str], Excess]) -> list[
         *(Column(name, run.label(name), "%", digits=2) for name in (run.reference, *members)),
     )  # fmt: skip
     caption = (
-        "Typical relative excess against each simulation in the reference's place. Below zero: less total "
-        "energy than that simulation."
+        "Typical relative excess against each simulation in the reference's place. Below zero: less "
+        "energy than that."
     )
     return table("excess_by_time_step", columns, lines, caption, grouped_by=("garment",))
 
@@ -138,7 +138,7 @@ def _error_title(metric: Metric) -> str:
 
 
 def errors_in_spreads(run: Run) -> list[Table]:
-    """Tabulate distances, curvature errors and dynamics in errors of another start of the reference."""
+    """Tabulate distances, curvature and dynamics in errors of the reference's other start."""
     metrics = [run.metrics[name] for name in AT_REFERENCE if name in run.metrics]
     variants = set(run.with_role("reference", "reference-variant"))
     lines: list[tuple[Cell, ...]] = []
@@ -214,7 +214,7 @@ def extremes(run: Run) -> list[Table]:
 
 
 def unfinished(run: Run) -> list[Table]:
-    """List every cell that failed or was skipped, once per reason, whatever the number of its metrics."""
+    """List every cell that failed or was skipped, once per reason, not per metric."""
     judged_elsewhere = (run.frame["case"] != "") & (run.frame["status"] != "skipped")
     rows = run.frame[(run.frame["status"] != "ok") & ~judged_elsewhere]
     names = ["suite", "scene", "method", "seed", "status", "reason"]

@@ -1,23 +1,15 @@
-"""Tables of page one: few methods and few numbers, rivals of SNUG, and how certain the reference is."""
+"""The table of page one: few methods and few numbers, and rivals of SNUG."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from reports.finished_run import Run
-from reports.statistics.means_and_spreads import mean_of, value_of
+from reports.statistics.means_and_spreads import mean_of
 from reports.statistics.outcomes import EXTERNAL, leads
-from reports.statistics.pareto import (
-    NETWORK,
-    SMALLER_STEPS,
-    compared_scenes,
-    indistinct,
-    reference_scenes,
-    rivals,
-    run_time,
-)
+from reports.statistics.pareto import compared_scenes, rivals, run_time
 from reports.statistics.relative_excess import SKINNING, excess_of, own_excess_of, with_relative_excess
-from reports.tables.table import Cell, Column, Table, in_scenes, metric_column, scene_in_words, table
+from reports.tables.table import Cell, Column, Table, in_scenes, metric_column, table
 
 ROWS = 8
 ANSWERS = ("penetration/surface", "dynamics/correlation", "dynamics/amplitude")
@@ -25,7 +17,7 @@ GAP = "gap/energy"
 
 
 def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
-    """Tabulate reference, baselines and networks of the first garment, and the solvers as good as SNUG.
+    """Tabulate methods on the first garment, and the solvers as good as SNUG.
 
     methods: rows in place of these.
 
@@ -86,45 +78,3 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     caption += f"; run times (and energy gaps) {in_scenes(scenes)}." if garment and scenes else "."
     method = Column("method", "Method", text=True, method=True)
     return table("overview", (method, *columns), lines, caption)
-
-
-UNCERTAIN = ("curvature/histogram", "curvature/error", "distance/rms")
-OF_STEPS = ("energy/strain", "dynamics/correlation", "dynamics/amplitude")  # which it changes
-
-
-def reference_uncertainty(run: Run) -> list[Table]:
-    """Tabulate how far equally valid references, and smaller time steps, lie from the reference.
-
-    There is no table where a run has neither.
-    """
-    frame = run.cells("speed", "garments")
-    scenes = reference_scenes(run)
-    rows = frame[frame["scene"].isin(scenes)]
-    metrics = [run.metrics[name] for name in (*OF_STEPS, *UNCERTAIN) if name in run.metrics]
-    twin = [
-        None if metric.name in OF_STEPS else indistinct(run, rows, metric.name) or None
-        for metric in metrics
-    ]
-    lines: list[tuple[Cell, ...]] = [("the reference from another start", *[None] * len(scenes), *twin)]
-    steps = [m for m in run.methods.values() if m.family == SMALLER_STEPS and m.level]
-    if not (steps or any(value is not None for value in twin)):
-        return []
-    labels = {m.name: f"{m.level:g} steps a frame" for m in sorted(steps, key=lambda m: m.level or 0.0)}
-    labels |= {name: run.label(name) for name in (run.reference, NETWORK, "pbns")}
-    for name, label in labels.items():
-        excess = excess_of(run, rows, name)
-        values = (value_of(rows, name, metric.name) for metric in metrics)
-        shares = excess.by_motion if excess else {}
-        lines.append((label, *map(shares.get, scenes), *values))
-    lines = [line for line in lines if any(value is not None for value in line[1:])]
-    of_scenes = [
-        Column(f"excess_{scene}", f"Relative excess, {scene.partition('/')[2]}", "%", digits=2)
-        for scene in scenes
-    ]
-    columns = (Column("of", "Simulation or network", text=True), *of_scenes, *map(metric_column, metrics))
-    caption = (
-        f"Reference, simulations with smaller time steps, and networks {in_scenes(scenes)} "
-        f"({'; '.join(map(scene_in_words, scenes))}). Errors below the twin's from another start are as "
-        "small as those of another valid simulation."
-    )
-    return table("reference_uncertainty", columns, lines, caption)

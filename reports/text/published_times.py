@@ -1,7 +1,6 @@
 """Run times as others publish them, beside those of this project's runs, in ms a frame.
 
-reports/published/times has the published ones, of which page, section or file can be named, and the
-processor time a body where bodies are computed at once.
+reports/published/times has the published ones, of which page, section or file can be named.
 """
 
 from __future__ import annotations
@@ -15,10 +14,10 @@ from reports.statistics.means_and_spreads import Mean
 from reports.statistics.outcomes import PUBLISHED
 from reports.tables.table import DASH, Table, number
 
-MANY = 64  # bodies at once
+OURS = ("cost/whole", "cost/frame", "cost/batch")
 HEADS = (
     "Method", "Published [ms]", "Device, batch, clock", "Source", "End to end [ms]", "Method alone [ms]",
-    f"{MANY} at once [ms]",
+    "16 at once [ms]",
 )  # fmt: skip
 
 
@@ -29,15 +28,14 @@ def time_rows(costs: Sequence[tuple[Run, Table]], methods: Sequence[str]) -> lis
         costs: runs with their tables of costs; a method is measured in the first that has it.
         methods: names; some have several published times, most none.
     """
-    batches, published = (pd.read_csv(PUBLISHED / "times" / f"{x}.csv") for x in ("batches", "published"))
-    many = batches[batches["bodies"] == MANY].set_index("method")["processor_ms"]
+    published = pd.read_csv(PUBLISHED / "times" / "published.csv")
     measured: dict[str, tuple[str, ...]] = {}
     for run, table in reversed(costs):
         places = {column.name: place for place, column in enumerate(table.columns)}
         for row in table.rows:
-            method, *means = (row[places[name]] for name in ("method", "cost/whole", "cost/frame"))
+            method, *means = (row[places[name]] for name in ("method", *OURS))
             here = [number(mean.value if isinstance(mean, Mean) else None) for mean in means]
-            measured[str(method)] = run.label(str(method)), *here, number(many.get(method))
+            measured[str(method)] = run.label(str(method)), *here
     known = {name: rows.to_numpy().tolist() for name, rows in published.groupby("method", sort=False)}
     rows: list[tuple[str, ...]] = [HEADS]
     for name in dict.fromkeys([*methods, *(name for name in known if name not in measured)]):

@@ -1,11 +1,89 @@
-"""Styles of methods, figures of the report, and curves of the plane of run time and error."""
+"""Figures: the look of methods, curves, and room for many: panels stay large, no text covers another."""
 
 from __future__ import annotations
 
-from reports.figures import plotting
+import itertools
+
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.legend import Legend
+from matplotlib.text import Text
+from matplotlib.transforms import Bbox
+
+from reports.blocks import FIGURES
 from reports.figures.charts import curves_of
+from reports.figures.plotting import PAGE_WIDTH, Drawing, style
+from reports.statistics.outcomes import PUBLISHED, read_published
 from reports.statistics.pareto import Point
+from reports.statistics.relative_excess import excess_of, with_relative_excess
 from tests.reports.report_folder import row, run_of
+
+LEAST = 4.0  # [cm] that a panel is wide and high on paper
+PRINTED = 17.0 / 2.54 / PAGE_WIDTH  # inches on paper of an inch of a figure as wide as the page
+LETTERS = 1.0  # [points] by which boxes of texts may overlap: letters do not fill them
+
+
+@pytest.fixture(scope="module")
+def drawings() -> list[Drawing]:
+    """The figures of the published run of 26 methods."""
+    run = read_published(PUBLISHED / "ablations")
+    return [drawing for figure in FIGURES if (drawing := figure.draw(run))]
+
+
+def test_panels_of_many_methods_are_at_least_four_centimetres_wide_and_high(drawings):
+    for drawing in drawings:
+        FigureCanvasAgg(drawing.canvas).draw()
+        scale = 2.54 * min(PRINTED, 17.0 / 2.54 / drawing.canvas.get_figwidth()) / drawing.canvas.dpi
+        for axes in drawing.canvas.axes:
+            width, height = (scale * length for length in axes.get_window_extent().bounds[2:])
+            assert min(width, height) >= LEAST, drawing.name
+
+
+def test_dots_of_many_methods_are_their_excesses_in_each_motion(drawings):
+    (axes,) = next(d.canvas for d in drawings if d.name == "excess_by_motion").axes
+    row = [tick.get_text() for tick in axes.get_yticklabels()].index("SNUG")
+    run = read_published(PUBLISHED / "ablations")
+    excess = excess_of(run, with_relative_excess(run, run.garment_rows), "snug")
+    assert sorted(axes.lines[2 * row].get_xdata()) == pytest.approx(sorted(excess.by_motion.values()))
+    assert len(axes.get_yticks()) == 15
+
+
+def test_no_text_covers_another_or_a_panel_and_all_are_inside_the_figure(drawings):
+    for drawing in drawings:
+        canvas = drawing.canvas
+        FigureCanvasAgg(canvas).draw()
+        beside, written = texts(canvas)
+        legends = [("legend", inner(legend)) for legend in canvas.legends]
+        panels = [axes.get_window_extent() for axes in canvas.axes]
+        outer = [(text.get_text(), inner(text)) for text in beside] + legends
+        assert not [name for name, box in outer if any(map(box.fully_overlaps, panels))], drawing.name
+        boxes = [*outer, *((text.get_text(), inner(text)) for text in written)]
+        pairs = itertools.combinations(boxes, 2)
+        covered = [(one[0], other[0]) for one, other in pairs if one[1].fully_overlaps(other[1])]
+        assert not covered, drawing.name
+        left, low, right, high = canvas.bbox.extents
+        cut = [n for n, box in boxes if box.x0 < left or box.y0 < low or box.x1 > right or box.y1 > high]
+        assert not cut, drawing.name
+
+
+def inner(drawn: Text | Legend) -> Bbox:
+    """Box of its letters [pixel]."""
+    return drawn.get_window_extent().padded(-LETTERS * drawn.get_figure().dpi / 72.0)
+
+
+def texts(canvas) -> tuple[list[Text], list[Text]]:
+    """Texts that are seen: around panels, and in them."""
+    around = list(canvas.texts)
+    for axes in canvas.axes:
+        around.append(axes.title)
+        for axis in (axes.xaxis, axes.yaxis):
+            low, high = sorted(axis.get_view_interval())
+            ticks = [tick for tick in axis.get_major_ticks() if low <= tick.get_loc() <= high]
+            around += [axis.label, *(tick.label1 for tick in ticks)]
+    written = [text for axes in canvas.axes for text in axes.texts]
+    return tuple(
+        [t for t in some if t.get_visible() and t.get_text().strip()] for some in (around, written)
+    )
 
 
 def test_methods_keep_their_order_and_their_look():
@@ -13,8 +91,8 @@ def test_methods_keep_their_order_and_their_look():
     run = run_of([row(method=name) for name in names])
     known = ["simulation", "skinning", "snug", "zebra", "newton-2", "newton-4", "newton-8"]
     assert run.ordered(names) == known
-    assert plotting.style(run, "newton-2").label == "Newton, 2 iterations"
-    assert plotting.style(run, "newton-2").colour == plotting.style(run, "newton-4").colour
+    assert style(run, "newton-2").label == "Newton, 2 iterations"
+    assert style(run, "newton-2").colour == style(run, "newton-4").colour
 
 
 # method: run time, error
