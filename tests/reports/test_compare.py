@@ -125,6 +125,16 @@ def test_what_the_uncertainty_or_2_percent_covers_is_no_change():
     assert found(a_run(), both) == [("worse", "tshirt", "simulation", "energy/strain")]
 
 
+def test_of_thousands_of_answers_the_farthest_by_chance_is_no_change():
+    def drawn(seed: int) -> list[Row]:
+        values = np.random.default_rng(seed).normal(10.0, 0.3, 3000)
+        return [row(f"tshirt/{k}", "simulation", value=x, uncertainty=0.3) for k, x in enumerate(values)]
+
+    before, after = drawn(0), drawn(1)
+    assert not fails(before, after)
+    assert fails(before, [replace(after[0], value=13.0), *after[1:]])
+
+
 def test_a_correlation_of_the_other_sign_is_worse():
     def signed(sign: float) -> list[Row]:
         values = {(s, seed): sign * (0.8 + 0.01 * seed) for s in SCENES for seed in SEEDS}
