@@ -16,12 +16,6 @@ from reports.tables.paper_tables import CURVATURE, paper_tables
 from tests.reports.report_folder import SCENES, row, run_of
 
 
-def seeds_of(method, metric, values, **more):
-    return [
-        row(method=method, metric=metric, value=value, seed=k, **more) for k, value in enumerate(values)
-    ]
-
-
 def column(table, name):
     return [column.name for column in table.columns].index(name)
 
