@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cache
 
@@ -244,14 +244,20 @@ def _one_seed(mean: Mean, beside: Mean) -> bool:
 def _changes(one: Mean, other: Mean, scale: str) -> dict[str, float]:
     """Return the change of the effect's value by each member of the reference's family, on the scale.
 
-    A member takes the reference's place in every scene at once, so only those count that converged in
-    all.
+    A member counts that converged in most scenes. It takes the reference's place in all those at once in
+    which every such member converged; these have to be most, too.
     """
-    in_scenes = [
-        mean.moved.get(cell, {}).keys() for mean in (one, other) if mean.moved for cell in mean.cells
+    cells = [
+        (cell, mean.moved.get(cell, {})) for mean in (one, other) if mean.moved for cell in mean.cells
     ]
-    names = set.intersection(*map(set, in_scenes)) if in_scenes else set()
-    return {name: _moved_by(one, name, scale) - _moved_by(other, name, scale) for name in sorted(names)}
+    every = {scene for (scene, _), _ in cells}
+    names = sorted({name for _, moved in cells for name in moved})
+    whole = {name: every - {cell[0] for cell, moved in cells if name not in moved} for name in names}
+    most = {name: scenes for name, scenes in whole.items() if 2 * len(scenes) > len(every)}
+    shared = set.intersection(*most.values()) if most else set()
+    if 2 * len(shared) <= len(every):
+        return {}
+    return {n: _moved_by(one, n, scale, shared) - _moved_by(other, n, scale, shared) for n in most}
 
 
 def _unpaired(one: Mean, other: Mean, scale: str) -> float:
@@ -267,10 +273,12 @@ def _slope(mean: Mean, scale: str) -> float:
     return 1.0 / abs(mean.value) if scale == RATIO else 1.0
 
 
-def _moved_by(mean: Mean, name: str, scale: str) -> float:
-    """Return by how much a member of the family changes the mean on the scale."""
+def _moved_by(mean: Mean, name: str, scale: str, scenes: Collection[str]) -> float:
+    """Return by how much a member of the family changes the mean over these scenes on the scale."""
     changes: dict[tuple[str, int], float] = {}
     for cell, value in mean.cells.items():
+        if cell[0] not in scenes:
+            continue
         moved = value + mean.moved.get(cell, {}).get(name, 0.0)
         if scale == RATIO and moved <= 0.0:  # no logarithm: to first order
             changes[cell] = moved / value - 1.0

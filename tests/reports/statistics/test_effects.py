@@ -263,6 +263,11 @@ def test_two_starts_make_the_noise_and_smaller_steps_a_trend_that_may_turn_the_s
     first, *_ = one.moved
     third = replace(one, moved=one.moved | {first: one.moved[first] | {"simulation-dt/8": -5.0}})
     assert effect(third, other, DIFFERENCE).against == comparison.against
+    # One that stalled in one motion of three moves the value as in the other two.
+    most = effect(*moved_means({"snug": (*snug, (9.0,)), "pbns": (*none, (0.0,))}), DIFFERENCE)
+    assert (
+        most.against == pytest.approx(comparison.against) and most.uncertainty == comparison.uncertainty
+    )
     # Smaller steps alone have no noise.
     trend = effect(*moved_means({"snug": ((0.0,), (0.0,)), "pbns": ((), ())}), DIFFERENCE)
     assert trend.uncertainty == 0.0
