@@ -41,7 +41,6 @@ from reports.statistics.relative_excess import excess_of, with_relative_excess
 from reports.statistics.verdicts import measure_of
 from reports.tables import TABLES
 from reports.tables.page_one import overview
-from reports.tables.paper_tables import paper_tables
 from reports.tables.pivots import metric_tables
 from reports.tables.table import DASH, Table, number
 from reports.text.published_times import time_rows
@@ -205,7 +204,7 @@ def _made(folder: Path, name: str) -> Table:
     run = read_published(folder)
     makers = {make.__name__: make for make in TABLES}
     tables = makers[name](run) if name in makers else metric_tables(run, name)
-    tables = tables or [made for made in paper_tables(run) if made.name == name]
+    tables = tables or [made for make in TABLES for made in make(run) if made.name == name]
     if not tables:
         raise KeyError(f"table {name} of {folder.name}")
     return tables[0]
