@@ -252,6 +252,8 @@ def worst_frame(run: Run) -> Drawing | None:
     """
     rows = run.garment_rows
     network = next((name for name in leads(run, rows) if run.methods[name].role in LEARNED), "")
+    if "total" not in run.frame_energies:
+        return None
     frames = run.frame_energies[run.frame_energies["scene"].isin(set(rows["scene"]))]
     # Of the first seed.
     totals = frames.pivot_table("total", ["scene", "seconds"], "method", "first")

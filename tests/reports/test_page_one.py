@@ -18,7 +18,7 @@ SENTENCES = """\
 Verdict: In a typical unseen motion SNUG removes 90 % of the energy that skinning has in excess of a
 converged simulation (88 % pooled over all motions).
 How certain: Of 1 test of primary claims of the paper 1 is inconclusive with one seed; in the published run 6
-hold, 1 does not hold, 2 are inconclusive."""
+hold, 2 do not hold, 1 is inconclusive."""
 
 
 def said(topic: str, rows, **config) -> str:
