@@ -3,7 +3,7 @@
 A network is tested in each scene over its seeds. Three seeds say little of their scatter, so the scatter
 is pooled over the scenes of the method. A scene that scatters more has its own; one that scatters far more
 stays out of the pool. The test is Student's with the pooled degrees of freedom, by Bonferroni for all these
-tests, and so is the normal quantile of the reference's noise, with which a method without seeds is compared.
+tests. A method without seeds is compared with the noise of the reference by as strict a normal quantile.
 """
 
 from __future__ import annotations

@@ -244,16 +244,19 @@ def _one_seed(mean: Mean, beside: Mean) -> bool:
 def _changes(one: Mean, other: Mean, scale: str) -> dict[str, float]:
     """Return the change of the effect's value by each member of the reference's family, on the scale.
 
-    A member counts that converged in most scenes. It takes the reference's place in all those at once in
-    which every such member converged; these have to be most, too.
+    Members count that converged in most scenes. They take the reference's place in those in which all of
+    them converged, if these are most.
     """
     cells = [
         (cell, mean.moved.get(cell, {})) for mean in (one, other) if mean.moved for cell in mean.cells
     ]
     every = {scene for (scene, _), _ in cells}
     names = sorted({name for _, moved in cells for name in moved})
-    whole = {name: every - {cell[0] for cell, moved in cells if name not in moved} for name in names}
-    most = {name: scenes for name, scenes in whole.items() if 2 * len(scenes) > len(every)}
+    most: dict[str, set[str]] = {}
+    for name in names:
+        whole = every - {scene for (scene, _), moved in cells if name not in moved}
+        if 2 * len(whole) > len(every):
+            most[name] = whole
     shared = set.intersection(*most.values()) if most else set()
     if 2 * len(shared) <= len(every):
         return {}
@@ -274,7 +277,7 @@ def _slope(mean: Mean, scale: str) -> float:
 
 
 def _moved_by(mean: Mean, name: str, scale: str, scenes: Collection[str]) -> float:
-    """Return by how much a member of the family changes the mean over these scenes on the scale."""
+    """Return by how much a member of the family changes the mean over these scenes."""
     changes: dict[tuple[str, int], float] = {}
     for cell, value in mean.cells.items():
         if cell[0] not in scenes:

@@ -114,8 +114,8 @@ def _by_time_step(run: Run, excesses: Mapping[tuple[str, str], Excess]) -> list[
         *(Column(name, run.label(name), "%", digits=2) for name in (run.reference, *members)),
     )  # fmt: skip
     caption = (
-        "Typical relative excess against each simulation in the reference's place, which moves it as in the "
-        "motions in which all of these converged. Below zero: less energy than that."
+        "Typical relative excess against each simulation in the reference's place; changes are those in "
+        "motions in which all converged. Below zero: less energy than that."
     )
     return table("excess_by_time_step", columns, lines, caption, grouped_by=("garment",))
 
