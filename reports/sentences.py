@@ -48,7 +48,7 @@ def _trained(run: Run, worn: pd.DataFrame) -> str:
 
 
 def verdict(run: Run, worn: pd.DataFrame) -> str:
-    """Say what one method removes of skinning's excess energy, in which time, and how its dynamics are.
+    """Say what one method leaves of skinning's excess energy, in which time, and how its dynamics are.
 
     It is the user's own, or else the first network of page one that these rows have.
     """
@@ -61,16 +61,14 @@ def verdict(run: Run, worn: pd.DataFrame) -> str:
     excess = known[name]
     # Those in which skinning has an excess: a network that failed in one has a remark on it.
     scenes = set(rows[(rows["metric"] == RELATIVE_EXCESS.name) & rows["usable"]]["scene"])
-    removes = excess.typical < 100.0
-    share, pooled = (100.0 - x if removes else x for x in (excess.typical, excess.pooled))
     several = run.garment_rows["garment"].nunique() > 1
     motion = "motion" + f" of the {run.first_garment}" * several
     text = (
         f"In {'a typical' if len(scenes) > 1 else 'one'} {_kind(run, scenes)}{motion} {run.label(name)} "
-        f"{'removes' if removes else 'has'} {number(share, 2)} % of the energy that skinning has in excess "
-        "of a converged simulation"
+        f"leaves {number(excess.typical, 2)} % of the energy that skinning has in excess of a converged "
+        "simulation"
     )
-    text += f" ({number(pooled, 2)} % pooled over all motions)" if len(scenes) > 1 else ""
+    text += f" ({number(excess.pooled, 2)} % of the sum over motions)" if len(scenes) > 1 else ""
     if times := _times_faster(run, name):
         text += f", more than {times} times faster than that simulation"
     if (alike := value_of(worn, name, ALIKE)) is not None:

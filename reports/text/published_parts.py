@@ -35,7 +35,7 @@ from reports.sentences import verdict
 from reports.statistics.effects import RATIO
 from reports.statistics.means_and_spreads import mean_of
 from reports.statistics.outcomes import PUBLISHED, read_published
-from reports.statistics.paper_claims import EXPLORATORY, PRIMARY, Claim, Judged, judged
+from reports.statistics.paper_claims import EXPLORATORY, PRIMARY, UNSEEN, Claim, Judged, judged
 from reports.statistics.pareto import NETWORK, compared_scenes, fastest, points_of, truncated
 from reports.statistics.relative_excess import excess_of, with_relative_excess
 from reports.statistics.verdicts import measure_of
@@ -149,13 +149,15 @@ def front_sentences(run: Run) -> str:
         raise ValueError(
             "the run lacks SNUG, PBNS, the supervised network, or their times beside solvers"
         )
+    p = next((line.p for line in judged(run) if line.claim.says == UNSEEN), None)
     worst, most = snug.worst
     return "\n".join([
         f"**{verdict(run, worn)}**",
         "",
-        f"- Good at: energy for its time. PBNS leaves {number(pbns.typical, 2)} % of that excess, "
-        f"supervision {number(supervised.typical, 2)} %; equally accurate solvers take at least "
-        f"{number(solver.time / network.time, 1)} times as long.",
+        f"- Good at: energy for its time. Supervised leaves {number(supervised.typical, 2)} % of that excess "
+        f"(p {number(p, 2)}, paired by motion), PBNS {number(pbns.typical, 2)} %; the fastest solver as "
+        f"accurate a frame, {run.label(solver.method)}, takes {number(solver.time / network.time, 1)} times "
+        "as long.",
         f"- Bad at: dynamics and unfamiliar motion. Its hem's correlation with the simulation's is "
         f"{number(alike.value, 2)}, its amplitude {number(100.0 * swing.value, 1)} %; the worst motion, "
         f"{worst.partition('/')[2]}, keeps {number(most, 2)} %.",
