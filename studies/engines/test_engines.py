@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import gzip
 import sys
 from pathlib import Path
 from types import SimpleNamespace
@@ -201,7 +202,7 @@ def test_an_absent_engine_is_skipped_with_its_command(monkeypatch, plan):
 
 def test_the_study_asks_for_what_was_published_each_engine_in_a_process_of_its_own(plan):
     assert {case.process for case in plan.cases} == {f"engine-{name}" for name in ENGINES}
-    with (PUBLISHED / "results.csv").open(newline="", encoding="utf-8") as file:
+    with gzip.open(PUBLISHED / "results.csv.gz", "rt", newline="", encoding="utf-8") as file:
         published = {tuple(row[name] for name in ROW) for row in csv.DictReader(file)}
     asked = {tuple(getattr(case, name) for name in ROW) for case in plan.cases}
     assert published <= asked and len(asked) == len(plan.cases)
@@ -212,7 +213,7 @@ def test_the_study_asks_for_what_was_published_each_engine_in_a_process_of_its_o
 
 def test_tables_of_the_published_run_are_the_frozen_ones_and_stand_in_the_readme():
     readme = (HERE / "README.md").read_text(encoding="utf-8")
-    for name, table in audit_tables.tables(pd.read_csv(PUBLISHED / "results.csv")).items():
+    for name, table in audit_tables.tables(pd.read_csv(PUBLISHED / "results.csv.gz")).items():
         text = table.to_csv(index=False, float_format="%.9g", na_rep="-")
         assert text == (HERE / "frozen" / f"{name}.csv").read_text(encoding="utf-8")
         assert audit_tables.markdown(table) in readme
