@@ -39,9 +39,8 @@ from reports.statistics.paper_claims import EXPLORATORY, PRIMARY, UNSEEN, Claim,
 from reports.statistics.pareto import NETWORK, compared_scenes, fastest, points_of, truncated
 from reports.statistics.relative_excess import excess_of, with_relative_excess
 from reports.statistics.verdicts import measure_of
-from reports.tables import TABLES
+from reports.tables import make_tables
 from reports.tables.page_one import overview
-from reports.tables.pivots import metric_tables
 from reports.tables.table import DASH, Table, number
 from reports.text.published_times import time_rows
 from reports.text.text_table import markdown_table, remarks_on, text_rows
@@ -141,15 +140,15 @@ def front_sentences(run: Run) -> str:
     worn, cells = run.garment_rows, run.cells("speed", "garments")
     rows = with_relative_excess(run, worn)
     snug, pbns, supervised = (excess_of(run, rows, name) for name in (NETWORK, "pbns", "supervised"))
+    p = next((line.p for line in judged(run) if line.claim.says == UNSEEN), None)
     swing, alike = (mean_of(worn, NETWORK, name) for name in (SWING, ALIKE))
     points = points_of(run, cells, compared_scenes(run, cells), "gap/energy")
     network = next((point for point in points if point.method == NETWORK), None)
     solver = fastest(truncated(run, points), network.error) if network else None
-    if not (snug and pbns and supervised and swing and alike and network and solver):
+    if not (snug and pbns and supervised and p and swing and alike and network and solver):
         raise ValueError(
             "the run lacks SNUG, PBNS, the supervised network, or their times beside solvers"
         )
-    p = next((line.p for line in judged(run) if line.claim.says == UNSEEN), None)
     worst, most = snug.worst
     return "\n".join([
         f"**{verdict(run, worn)}**",
@@ -201,15 +200,14 @@ def _table(folder: Path, name: str, wanted: Sequence[str], methods: Sequence[str
 
 
 @cache
+def _tables(folder: Path) -> dict[str, Table]:
+    return make_tables(read_published(folder))
+
+
 def _made(folder: Path, name: str) -> Table:
-    """Return a table of a run: metrics declare many, others have the name of the function that makes them."""
-    run = read_published(folder)
-    makers = {make.__name__: make for make in TABLES}
-    tables = makers[name](run) if name in makers else metric_tables(run, name)
-    tables = tables or [made for make in TABLES for made in make(run) if made.name == name]
-    if not tables:
+    if name not in _tables(folder):
         raise KeyError(f"table {name} of {folder.name}")
-    return tables[0]
+    return _tables(folder)[name]
 
 
 def chosen_rows(rows: Rows, names: Sequence[str]) -> Rows:

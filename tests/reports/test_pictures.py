@@ -43,8 +43,8 @@ def test_the_still_has_what_came_to_its_end_at_the_liveliest_frame(run):
 
 
 def test_the_worst_frame_is_where_the_network_lies_farthest_above_the_reference(run):
-    lines = [(SCENE, name, 0, t / 30, e) for name, own in {"simulation": [5, 1, 0], "snug": [6, 4, 1]}.items()
-             for t, e in enumerate(own)]  # fmt: skip
+    totals = {"simulation": [5, 1, 0], "snug": [6, 4, 1]}
+    lines = [(SCENE, name, 0, t / 30, e) for name in totals for t, e in enumerate(totals[name])]
     frames = pd.DataFrame(lines, columns=["scene", "method", "seed", "seconds", "total"])
     caption = worst_frame(replace(read_run(run), frame_energies=frames)).caption
     assert "frame 1, where SNUG has most energy above the reference, 3 J" in caption
