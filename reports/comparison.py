@@ -144,12 +144,12 @@ def compare(
         machines = [m.name for run in (one, other) for m in run.metrics.values() if m.of == "machine"]
         of_metrics = [frame[~frame["metric"].isin(machines)] for frame in of_metrics]
     lost = [] if shared else gone(*of_metrics)
-    kept = _shared(of_metrics, *CELL)
-    if kept[0].empty:
+    pairs = _shared(of_metrics, *CELL)
+    if pairs[0].empty:
         raise ResultsError(
             "the two runs share no such scene, method, seed and metric: nothing to compare"
         )
-    before, after = (frame.set_index(CELL)["protocol"] for frame in kept)
+    before, after = (frame.set_index(CELL)["protocol"] for frame in pairs)
     differ = before[before != after.reindex(before.index)]
     if len(differ):
         place = " x ".join(map(str, differ.index[0][:2]))
@@ -159,8 +159,8 @@ def compare(
         )
     drawn = _of_one_seed(*of_metrics)
     alone = set(drawn[1]["method"])
-    kept = [frame[~(frame["seeded"] & frame["method"].isin(alone))] for frame in kept]
-    judged, compared = _means(one, *_without_more_noise(*kept), basis=cells[0])
+    pairs = [frame[~(frame["seeded"] & frame["method"].isin(alone))] for frame in pairs]
+    judged, compared = _means(one, *_without_more_noise(*pairs), basis=cells[0])
     earlier, later = _with_known_zero(one, *drawn, basis=cells[0])
     of_one_seed = changed_scenes(earlier, later, _metrics(one))
     order = (GONE, WORSE, BETTER, OTHER)
@@ -182,19 +182,19 @@ def _headline(
     garment = run.first_garment
     usable = [f[f["usable"] & (f["place"] == garment) & (f["case"] == "")] for f in frames]
     worn = _shared(usable, "scene", "method", "metric")
-    shown = run.ordered(set(worn[0]["method"]) - run.twins - set(run.with_role("reference-variant")))
+    names = run.ordered(set(worn[0]["method"]) - run.twins - set(run.with_role("reference-variant")))
     rows = {}
-    for method in sorted(shown, key=lambda name: name != NETWORK):
+    for method in sorted(names, key=lambda name: name != NETWORK):
         seeds = [set(f[(f["method"] == method) & f["seeded"]]["seed"]) for f in worn]
         verdict = "one seed" if len(seeds[0]) == len(seeds[1]) == 1 else "same"
         cells = []
         for metric in HEADLINE:
             before, after = (_value(run, frame, method, metric) for frame in worn)
-            found = {c.place: c.verdict for c in changes if (c.method, c.metric) == (method, metric)}
-            scenes = " and ".join(sorted({f"{change} in a scene" for change in found.values()}))
-            said = found.get(garment) or scenes or verdict
-            known = before is not None and after is not None
-            cells.append(f"{number(before)} → {number(after)} {said}" if known else DASH)
+            verdicts = {c.place: c.verdict for c in changes if (c.method, c.metric) == (method, metric)}
+            scenes = " and ".join(sorted({f"{change} in a scene" for change in verdicts.values()}))
+            words = verdicts.get(garment) or scenes or verdict
+            complete = before is not None and after is not None
+            cells.append(f"{number(before)} → {number(after)} {words}" if complete else DASH)
         if set(cells) != {DASH}:
             rows[method] = cells
     return rows
@@ -263,8 +263,8 @@ def _cells(run: Run) -> pd.DataFrame:
 
 
 def _matching(names: pd.Series, patterns: str) -> pd.Series:
-    chosen = [n for n in names.unique() if any(fnmatchcase(n, p.strip()) for p in patterns.split(","))]
-    return names.isin(chosen)
+    hits = [n for n in names.unique() if any(fnmatchcase(n, p.strip()) for p in patterns.split(","))]
+    return names.isin(hits)
 
 
 def _means(
@@ -277,12 +277,12 @@ def _means(
     rows = _over_the_same(*_with_known_zero(run, one, other, basis=basis))
     first, second = (means(frame, *GROUP).to_dict() for frame in rows)
     differ = {key: (mean, second[key]) for key, mean in first.items() if mean.cells != second[key].cells}
-    known = _metrics(run)
+    metrics = _metrics(run)
     scales = (
         rows[0].groupby(["place", "metric"])["value"].agg(lambda values: values.abs().median()).to_dict()
     )
     judged = [
-        (place, method, metric := known[name], mean, new, _effect(metric, new, mean))
+        (place, method, metric := metrics[name], mean, new, _effect(metric, new, mean))
         for (place, method, name), (mean, new) in differ.items()
         if name != WORST and (not mean.seeded or mean.seeds > 1)
     ]
@@ -306,7 +306,7 @@ def _means(
     worn = rows[0][rows[0]["place"] != rows[0]["scene"]]
     garments = dict(zip(worn["scene"], worn["place"]))
     before, after = (frame[frame["scene"].isin(garments)] for frame in rows)
-    of_scenes = changed_scenes(before, after, known)
+    of_scenes = changed_scenes(before, after, metrics)
     changes += [c for c in of_scenes if (garments[c.place], c.method, c.metric) not in reported]
     return changes, len(first)
 

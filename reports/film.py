@@ -46,12 +46,12 @@ def select_roll_outs(
     cloths = {}
     for method in methods:
         of_method = rows[rows["method"] == method]
-        chosen = of_method["seed"].min() if seed is None or not of_method["seeded"].any() else seed
-        cloth = run.roll_outs.cloth(scene, method, int(chosen)) if len(of_method) else None
+        first_seed = of_method["seed"].min() if seed is None or not of_method["seeded"].any() else seed
+        cloth = run.roll_outs.cloth(scene, method, int(first_seed)) if len(of_method) else None
         if cloth is None or not cloth.finite().frames:
-            kept = sorted(path.parent.name for path in folder.trajectories.glob("*/*.vtkhdf"))
+            stored = sorted(path.parent.name for path in folder.trajectories.glob("*/*.vtkhdf"))
             reason = (
-                "; ".join(run.problems) or f"scenes with roll-outs are {', '.join(dict.fromkeys(kept))}"
+                "; ".join(run.problems) or f"scenes with roll-outs are {', '.join(dict.fromkeys(stored))}"
             )
             raise ResultsError(f"{folder.path}: no roll-out of '{method}' in {scene}: {reason}")
         cloths[method] = cloth.finite()

@@ -110,10 +110,10 @@ class Run:
         """
         suites = suites or tuple(dict.fromkeys((*SUITES, *self.frame["suite"])))
         if suites not in self._cells:
-            kept = self.suite(*suites)
-            kept = kept[kept["case"] == ""]
-            kept = kept.sort_values("suite", key=lambda s: s.map(suites.index), kind="stable")
-            self._cells[suites] = kept.drop_duplicates(["scene", "method", "seed", "metric"])
+            rows = self.suite(*suites)
+            rows = rows[rows["case"] == ""]
+            rows = rows.sort_values("suite", key=lambda s: s.map(suites.index), kind="stable")
+            self._cells[suites] = rows.drop_duplicates(["scene", "method", "seed", "metric"])
         return self._cells[suites]
 
     @cached_property

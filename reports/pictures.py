@@ -84,19 +84,19 @@ def _paint(
     from reference_sim.geometry.surface import vertex_normals  # loads numba
 
     w, h = size
-    seen = camera.seen(surface.positions)
+    view = camera.seen(surface.positions)
     scale = h / camera.height
-    points = np.stack([w / 2.0 + scale * seen[:, 0], h / 2.0 - scale * seen[:, 1]], axis=1)
+    points = np.stack([w / 2.0 + scale * view[:, 0], h / 2.0 - scale * view[:, 1]], axis=1)
     pixels, faces, weights = _covered(points[surface.faces], w, h)
-    near = np.einsum("pk,pk->p", weights, seen[surface.faces[faces], 2]) + surface.lift
+    near = np.einsum("pk,pk->p", weights, view[surface.faces[faces], 2]) + surface.lift
     np.maximum.at(depth, pixels, near)
-    kept = near == depth[pixels]
-    pixels, corners, weights = pixels[kept], surface.faces[faces[kept]], weights[kept, :, None]
-    normals = (weights * vertex_normals(seen, surface.faces)[corners]).sum(axis=1)
+    front = near == depth[pixels]
+    pixels, corners, weights = pixels[front], surface.faces[faces[front]], weights[front, :, None]
+    normals = (weights * vertex_normals(view, surface.faces)[corners]).sum(axis=1)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     normals *= np.where(normals[:, 2:] < 0.0, -1.0, 1.0)
     key, fill = (np.clip(normals @ (light / np.linalg.norm(light)), 0.0, 1.0) for light in (KEY, FILL))
-    colours = np.broadcast_to(np.asarray(surface.colour, dtype=float), (len(seen), 3))
+    colours = np.broadcast_to(np.asarray(surface.colour, dtype=float), (len(view), 3))
     image[pixels] = (0.36 + 0.72 * key + 0.16 * fill)[:, None] * (weights * colours[corners]).sum(axis=1)
 
 
@@ -106,29 +106,29 @@ def _covered(corners: np.ndarray, w: int, h: int) -> tuple[np.ndarray, np.ndarra
     high = np.clip(np.ceil(corners.max(axis=1)).astype(int), 0, [w, h])
     first, ab, ac = corners[:, 0], corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     area = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
-    seen = np.flatnonzero((high > low).all(axis=1) & (area != 0.0))  # from its edge one covers nothing
-    low, spans, first, area = low[seen], (high - low)[seen], first[seen], area[seen, None]
+    faces = np.flatnonzero((high > low).all(axis=1) & (area != 0.0))  # edge-on: covers nothing
+    low, spans, first, area = low[faces], (high - low)[faces], first[faces], area[faces, None]
     # Weights of the second and third corner are linear in the pixel: slopes and the value at the low
     # corner.
     slopes = [
-        np.stack([ac[seen, 1], -ac[seen, 0]], axis=1) / area,
-        np.stack([-ab[seen, 1], ab[seen, 0]], axis=1) / area,
+        np.stack([ac[faces, 1], -ac[faces, 0]], axis=1) / area,
+        np.stack([-ab[faces, 1], ab[faces, 0]], axis=1) / area,
     ]
     starts = [(slope * (low + 0.5 - first)).sum(axis=1) for slope in slopes]
     counts = spans.prod(axis=1)
-    triangle = np.repeat(np.arange(len(seen)), counts)
+    triangle = np.repeat(np.arange(len(faces)), counts)
     place = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
     y, x = np.divmod(place, spans[triangle, 0])
     weights: list[np.ndarray] = []
     for slope, start in zip(slopes, starts):
         weight = start[triangle] + slope[triangle, 0] * x + slope[triangle, 1] * y
-        kept = weight >= 0.0
-        triangle, x, y = triangle[kept], x[kept], y[kept]
-        weights = [one[kept] for one in (*weights, weight)]
+        hits = weight >= 0.0
+        triangle, x, y = triangle[hits], x[hits], y[hits]
+        weights = [one[hits] for one in (*weights, weight)]
     weights.insert(0, 1.0 - weights[0] - weights[1])
-    kept = weights[0] >= 0.0
-    triangle, x, y = triangle[kept], x[kept] + low[triangle[kept], 0], y[kept] + low[triangle[kept], 1]
-    return y * w + x, seen[triangle], np.stack([weight[kept] for weight in weights], axis=1)
+    hits = weights[0] >= 0.0
+    triangle, x, y = triangle[hits], x[hits] + low[triangle[hits], 0], y[hits] + low[triangle[hits], 1]
+    return y * w + x, faces[triangle], np.stack([weight[hits] for weight in weights], axis=1)
 
 
 INERTIA = "energy/inertia"
@@ -174,10 +174,10 @@ def camera_path(selected: SceneRollOuts, axes: np.ndarray) -> tuple[np.ndarray, 
     """Return the camera's target in each frame (T,3) [m], smoothed, and half the height that it sees [m]."""
     cloths = selected.series.values()
     frames = max(cloth.frames for cloth in cloths)
-    seen = [cloth.positions @ axes for cloth in cloths]
+    views = [cloth.positions @ axes for cloth in cloths]
     low, high = (
         [np.pad(ends, ((0, frames - len(ends)), (0, 0)), mode="edge") for ends in corners]
-        for corners in ([x.min(axis=1) for x in seen], [x.max(axis=1) for x in seen])
+        for corners in ([x.min(axis=1) for x in views], [x.max(axis=1) for x in views])
     )
     lowest, highest = np.min(low, axis=0), np.max(high, axis=0)
     dt = selected.longest.dt

@@ -60,8 +60,8 @@ def side(metric: Metric, before: float, after: float, difference: float) -> str:
     """
     if metric.lower_is_better is not None:
         return WORSE if bool(difference > 0.0) is metric.lower_is_better else BETTER
-    known = 1.0 if metric.name.endswith("correlation") else None
-    best = AT_REFERENCE.get(metric.name.replace("/common_", "/"), known)
+    default = 1.0 if metric.name.endswith("correlation") else None
+    best = AT_REFERENCE.get(metric.name.replace("/common_", "/"), default)
     if best is None:
         return OTHER
     return WORSE if abs(after - best) > abs(before - best) else BETTER

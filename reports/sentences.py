@@ -48,29 +48,28 @@ def _trained(run: Run, worn: pd.DataFrame) -> str:
 
 
 def verdict(run: Run, worn: pd.DataFrame) -> str:
-    """Say what one method leaves of skinning's excess energy, in which time, and how its dynamics are.
+    """Say what one method has of skinning's excess energy, in which time, and how its dynamics are.
 
     It is the user's own, or else the first network of page one that these rows have.
     """
     names = [name for name in leads(run, worn) if run.methods[name].role in (*LEARNED, EXTERNAL)]
     rows = with_relative_excess(run, worn)
-    known = {name: excess for name in names if (excess := excess_of(run, rows, name))}
-    if not known:
+    excesses = {name: excess for name in names if (excess := excess_of(run, rows, name))}
+    if not excesses:
         return ""
-    name = min(known, key=lambda name: run.methods[name].role != EXTERNAL)
-    excess = known[name]
+    name = min(excesses, key=lambda name: run.methods[name].role != EXTERNAL)
+    excess = excesses[name]
     # Those in which skinning has an excess: a network that failed in one has a remark on it.
     scenes = set(rows[(rows["metric"] == RELATIVE_EXCESS.name) & rows["usable"]]["scene"])
     several = run.garment_rows["garment"].nunique() > 1
     motion = "motion" + f" of the {run.first_garment}" * several
     text = (
         f"In {'a typical' if len(scenes) > 1 else 'one'} {_kind(run, scenes)}{motion} {run.label(name)} "
-        f"leaves {number(excess.typical, 2)} % of the energy that skinning has in excess of a converged "
-        "simulation"
+        f"has {number(excess.typical, 2)} % of skinning's excess energy, that above a converged simulation"
     )
-    text += f" ({number(excess.pooled, 2)} % of the sum over motions)" if len(scenes) > 1 else ""
+    text += f" ({number(excess.pooled, 2)} % summed over all motions)" if len(scenes) > 1 else ""
     if times := _times_faster(run, name):
-        text += f", more than {times} times faster than that simulation"
+        text += f", and is more than {times} times faster than the simulation"
     if (alike := value_of(worn, name, ALIKE)) is not None:
         text += f"; the dynamics of its hem {likeness(alike)} the simulation's"
     return f"{text}{excess.fewer}."

@@ -70,9 +70,9 @@ def curves_of(run: Run, points: Iterable[Point]) -> list[Curve]:
     one and the same method. Variants of the reference are left out.
     """
     points = list(points)
-    shown = [p for p in points if run.methods[p.method].role != OF_REFERENCE] or points
+    visible = [p for p in points if run.methods[p.method].role != OF_REFERENCE] or points
     groups: dict[tuple[bool, str], list[Point]] = {}
-    for point in shown:
+    for point in visible:
         method = run.methods[point.method]
         solver = method.level is not None and method.role in ("solver", STARTED)
         key = (True, method.base) if solver else (False, method.family)
@@ -126,10 +126,10 @@ def draw_points(
     if len(best) > 1:
         axes.plot([p.time for p in best], [p.error for p in best], color=FRONT, linewidth=5.0, zorder=1)
     for curve in curves:
-        shown = [point for point in curve.points if point.error > least]
-        times, errors = [point.time for point in shown], [point.error for point in shown]
+        visible = [point for point in curve.points if point.error > least]
+        times, errors = [point.time for point in visible], [point.error for point in visible]
         axes.plot(times, errors, color=curve.look.colour, linestyle=curve.look.line, linewidth=1.1)
-        for point in (*shown, *(point for point in curve.aside if point.error > least)):
+        for point in (*visible, *(point for point in curve.aside if point.error > least)):
             colour = GREY if point.error < band else curve.look.colour
             pale = point in curve.aside
             _draw_marker(axes, point, style(run, point.method).marker, colour, pale=pale)
@@ -259,10 +259,10 @@ def energy_series(run: Run) -> Drawing | None:
         for method, curve in reversed(curves.items()):  # the reference last, on top
             look, energy = style(run, method), curve[term].where(curve[term] > 0.0)
             axes.plot(curve["seconds"], energy, color=look.colour, linestyle=look.line)
-        shown = np.concatenate([curve[term] for curve in curves.values()])
-        shown = shown[np.isfinite(shown) & (shown > 0.0)]
-        if len(shown):
-            axes.set_ylim(max(shown.min() / 1.5, shown.max() * LEAST), 1.6 * shown.max())
+        energies = np.concatenate([curve[term] for curve in curves.values()])
+        energies = energies[np.isfinite(energies) & (energies > 0.0)]
+        if len(energies):
+            axes.set_ylim(max(energies.min() / 1.5, energies.max() * LEAST), 1.6 * energies.max())
             log_axis(axes, "y")
         axes.set(title=term.capitalize(), xlabel="time [s]")
     panels[0].set_ylabel("energy [J]")

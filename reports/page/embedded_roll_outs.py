@@ -82,9 +82,9 @@ def residuals(steps: np.ndarray) -> np.ndarray:
     Small differences of either sign are small numbers: 0, -1, 1, -2, ... as 0, 1, 2, 3, ...
     """
     moved = np.diff(steps, axis=0, prepend=np.zeros_like(steps[:1]))
-    left = moved.copy()
-    left[2:] = moved[2:] - moved[1:-1]
-    signed = left.view(np.int16)
+    residual = moved.copy()
+    residual[2:] = moved[2:] - moved[1:-1]
+    signed = residual.view(np.int16)
     return ((signed << 1) ^ (signed >> 15)).view(np.uint16)
 
 
@@ -111,9 +111,9 @@ def groups(folder: RunFolder, run: Run) -> Iterator[tuple[str, dict[str, int]]]:
         kinds[1 if part == "clip" else 0 if garment else 2].append(str(scene))
     for leading in (True, False):
         for scene in (scene for scenes in kinds for scene in scenes):
-            chosen = {m: int(seeds[scene, m]) for m in run.ordered(seeds[scene].index)}
+            firsts = {m: int(seeds[scene, m]) for m in run.ordered(seeds[scene].index)}
             stored = {
-                m: s for m, s in chosen.items()
+                m: s for m, s in firsts.items()
                 if (m in first) is leading and folder.trajectory_path(scene, m, s).is_file()
             }  # fmt: skip
             if stored:
@@ -162,8 +162,8 @@ def embed(folder: RunFolder, run: Run, budget: int) -> Embedded:
         depths = _depths(cloths, skin) if skin else {}
         for method, cloth in cloths.items():
             texts: dict[str, str] = {}
-            known = embedded.scenes.get(scene)
-            shown = known or {
+            earlier = embedded.scenes.get(scene)
+            record = earlier or {
                 "title": scene_in_words(scene), "methods": {},
                 "body": _kept(texts, _body(body)) if body else None,
             }  # fmt: skip
@@ -175,7 +175,7 @@ def embed(folder: RunFolder, run: Run, budget: int) -> Embedded:
                 embedded.missing += 1
             else:
                 embedded.texts |= new
-                embedded.scenes[scene] = {**shown, "methods": {**shown["methods"], method: entry}}
+                embedded.scenes[scene] = {**record, "methods": {**record["methods"], method: entry}}
     return embedded
 
 
@@ -237,15 +237,15 @@ def _body(body: Trajectory) -> Pack:
     """Pack the body with few faces, the same vertices in every frame; whole where its faces do not close."""
     import igl
 
-    kept, faces = np.arange(body.positions.shape[1]), body.faces.astype(np.int64)
+    births, faces = np.arange(body.positions.shape[1]), body.faces.astype(np.int64)
     if len(faces) > SKIN_FACES:
         first = np.ascontiguousarray(body.positions[0], dtype=float)
         _, fewer, _, birth = igl.decimate(first, np.ascontiguousarray(faces), SKIN_FACES)
-        kept, faces = (birth, fewer) if len(fewer) else (kept, faces)
+        births, faces = (birth, fewer) if len(fewer) else (births, faces)
     pack = Pack()
     pack.indices("faces", faces)
     pack.numbers("times", body.times)
-    pack.positions("positions", body.positions[:, kept])
+    pack.positions("positions", body.positions[:, births])
     return pack
 
 

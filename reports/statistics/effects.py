@@ -196,7 +196,7 @@ def effect(one: Mean, other: Mean, scale: str = "", *, unit: float | None = None
         "seeds": any((grid != grid[:, :1]).any() for grid in grids),
     }
     changes = _changes(one, other, scale)
-    known = noise(changes)
+    spread = noise(changes)
     error, freedom = _bootstrap(grids) if any(repeated.values()) else (None, math.inf)
     return Effect(
         value=float(first.mean() - second.mean()),
@@ -206,7 +206,7 @@ def effect(one: Mean, other: Mean, scale: str = "", *, unit: float | None = None
         freedom=freedom,
         covers=" and ".join(name for name, several in repeated.items() if several),
         motions=len(first),
-        uncertainty=_unpaired(one, other, scale) if known is None else known,
+        uncertainty=_unpaired(one, other, scale) if spread is None else spread,
         against=trend(changes),
         unit=max(abs(one.value), abs(other.value)) if unit is None else unit,
         complete=one.complete and other.complete,
@@ -354,10 +354,10 @@ def _bootstrap(grids: Sequence[np.ndarray]) -> tuple[float, float]:
     alone += [drawn @ grid.mean(axis=0) for grid, drawn in zip(grids, seeds)]
     parts = np.array([part.var() for part in alone])
     free = np.array([len(grids[0]), *(grid.shape[1] for grid in grids)]) - 1
-    known = parts[free > 0] ** 2 / free[free > 0]
+    terms = parts[free > 0] ** 2 / free[free > 0]
     # Where only motion and seed together scatter, nothing tells: the fewest that any factor has.
     freedom = (
-        parts.sum() ** 2 / known.sum() if known.sum() > 0.0 else float(free[free > 0].min(initial=1))
+        parts.sum() ** 2 / terms.sum() if terms.sum() > 0.0 else float(free[free > 0].min(initial=1))
     )
     return float(np.std(draws)), float(freedom)
 

@@ -145,13 +145,13 @@ def value_of(frame: pd.DataFrame, method: str, metric: str) -> float | None:
 def shared_scenes(frame: pd.DataFrame, methods: Iterable[str], metric: str) -> list[str]:
     """Return the scenes in which each of the methods has the metric with all of its seeds."""
     rows = frame[frame["usable"] & (frame["metric"] == metric)]
-    kept = list(dict.fromkeys(frame["scene"]))
+    scenes = list(dict.fromkeys(frame["scene"]))
     for method in methods:
         of_method = rows[rows["method"] == method]
         seeds = of_method.groupby("scene")["seed"].nunique()
         full = set(seeds[seeds == of_method["seed"].nunique()].index)
-        kept = [scene for scene in kept if scene in full]
-    return kept
+        scenes = [scene for scene in scenes if scene in full]
+    return scenes
 
 
 def pair(frame: pd.DataFrame, one: str, other: str, metric: str) -> tuple[Mean | None, Mean | None]:
@@ -181,8 +181,8 @@ AT_REFERENCE = {
 
 def error_of_twin(rows: pd.DataFrame, metric: str) -> pd.Series:
     """Return scene -> error against the reference of its twin from another start, where that converged."""
-    kept = rows[(rows["metric"] == metric) & rows["usable"] & (rows["status"] == "ok")]
-    twin = kept[kept["method"] == SECOND_STARTS[0]]
+    errors = rows[(rows["metric"] == metric) & rows["usable"] & (rows["status"] == "ok")]
+    twin = errors[errors["method"] == SECOND_STARTS[0]]
     return (
         (twin["value"] - AT_REFERENCE.get(metric, 0.0)).abs().groupby(twin["scene"], observed=True).mean()
     )
@@ -195,10 +195,10 @@ def in_spreads(run: Run, rows: pd.DataFrame, method: str, metric: str) -> float 
     seeds. The result is the mean error of the scenes over their mean spread; None where no scene has a
     spread.
     """
-    kept = rows[(rows["metric"] == metric) & rows["usable"] & (rows["method"] == method)]
-    squares = (kept["value"] - AT_REFERENCE[metric]) ** 2
+    errors = rows[(rows["metric"] == metric) & rows["usable"] & (rows["method"] == method)]
+    squares = (errors["value"] - AT_REFERENCE[metric]) ** 2
     spread = error_of_twin(rows, metric)
-    error = squares.groupby(kept["scene"], observed=True).mean() ** 0.5
+    error = squares.groupby(errors["scene"], observed=True).mean() ** 0.5
     both = spread.index.intersection(error.index)
     total = float(spread[both].sum())
     return float(error[both].sum()) / total if total > 0.0 else None
@@ -241,8 +241,8 @@ def with_shares(
         shares = (
             (100.0 * more).groupby([both["scene"], both["seed"]]).mean().rename("share").reset_index()
         )
-        known = rows[(rows["method"] == method) & (rows["metric"] == f"energy/{term}") & rows["usable"]]
-        shared = known.merge(shares, on=["scene", "seed"])
+        terms = rows[(rows["method"] == method) & (rows["metric"] == f"energy/{term}") & rows["usable"]]
+        shared = terms.merge(shares, on=["scene", "seed"])
         metric = share_of_frames(term)
         shared = shared.assign(
             metric=metric.name, unit=metric.unit, value=shared["share"], uncertainty=float("nan"),

@@ -22,8 +22,8 @@ BAD = ("failed", "diverged", "timeout", "out-of-memory", "stalled")  # statuses,
 def checks(run: Run) -> pd.DataFrame:
     """Return the known answers, and rows of cells that have a tolerance."""
     is_case, rows = run.frame["case"] != "", run.frame
-    asked = np.where(is_case, rows["suite"] != "extremes", rows["tolerance"].notna())
-    return rows[asked & (rows["status"] != "skipped")]
+    checked = np.where(is_case, rows["suite"] != "extremes", rows["tolerance"].notna())
+    return rows[checked & (rows["status"] != "skipped")]
 
 
 def check_name(run: Run, row: Any) -> str:

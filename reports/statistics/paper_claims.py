@@ -218,19 +218,19 @@ def judged(run: Run) -> list[Judged]:
     rows = run.garment_rows
     frame = with_before(rows[rows["garment"] == run.first_garment])
     ran = set(frame["method"])
-    asked = [claim for claim in CLAIMS if {claim.lower, claim.higher} <= ran]
-    compared = [_compared(run, frame, claim) for claim in asked]
+    claims = [claim for claim in CLAIMS if {claim.lower, claim.higher} <= ran]
+    compared = [_compared(run, frame, claim) for claim in claims]
     p_values = [
         comparison.effect.p_value(claim.factor) if comparison.effect else None
-        for claim, comparison in zip(asked, compared)
+        for claim, comparison in zip(claims, compared)
     ]
     tested = [claim for claim in PRIMARY if claim.tested]
-    places = [k for k, (claim, p) in enumerate(zip(asked, p_values)) if claim in tested and p is not None]
+    places = [k for k, claim in enumerate(claims) if claim in tested and p_values[k] is not None]
     corrected = holm([p for k in places if (p := p_values[k]) is not None], family=len(tested))
     for place, p in zip(places, corrected):
         p_values[place] = p
     lines = []
-    for claim, comparison, p in zip(asked, compared, p_values):
+    for claim, comparison, p in zip(claims, compared, p_values):
         if comparison.effect is not None and comparison.one is not None and comparison.other is not None:
             outcome = verdict(claim, comparison.effect, p)
             remark = why_open(comparison.effect, claim.factor) if outcome == OPEN else ""

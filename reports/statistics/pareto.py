@@ -102,13 +102,8 @@ def fastest(points: Iterable[Point], error: float) -> Point | None:
 
 def solvers(run: Run, points: Iterable[Point]) -> list[Point]:
     """Return the points of solvers without anything learned, of the reference's discrete problem."""
-    kept = set(run.with_role("reference", "solver", "reference-variant"))
-    return [p for p in points if p.method in kept and run.methods[p.method].family != SMALLER_STEPS]
-
-
-def truncated(run: Run, points: Iterable[Point]) -> list[Point]:
-    """Return the points of solvers that differ from others of their family by one number."""
-    return [p for p in solvers(run, points) if run.methods[p.method].level is not None]
+    names = set(run.with_role("reference", "solver", "reference-variant"))
+    return [p for p in points if p.method in names and run.methods[p.method].family != SMALLER_STEPS]
 
 
 def indistinct(run: Run, rows: pd.DataFrame, metric: str) -> float:
@@ -118,10 +113,10 @@ def indistinct(run: Run, rows: pd.DataFrame, metric: str) -> float:
     the reference leaves on planes searched at its end. 0 where none is known.
     """
     if metric in PLANES:
-        kept = rows[
+        gaps = rows[
             rows["usable"] & (rows["metric"] == PLANES[metric]) & (rows["method"] == run.reference)
         ]
-        of_scene = kept.groupby("scene", observed=True)["value"].mean().abs()
+        of_scene = gaps.groupby("scene", observed=True)["value"].mean().abs()
     else:
         of_scene = error_of_twin(rows, metric)
     return float(of_scene.mean()) if len(of_scene) else 0.0
@@ -148,10 +143,10 @@ def error_points(run: Run, rows: pd.DataFrame, metric: str) -> list[Point]:
     # Smaller steps have errors of the garment, but none of the reference's own step.
     left_out = (SMALLER_STEPS,) if metric in OWN_STEP else ()
     reference = run.with_role("reference")
-    kept = [
+    timed_points = [
         p for p in points if run.methods[p.method].family not in left_out and p.method not in reference
     ]
-    return [p for p in kept if p.time > 0.0]
+    return [p for p in timed_points if p.time > 0.0]
 
 
 NETWORK = "snug"  # the method whose accuracy a solver has to reach to be its rival

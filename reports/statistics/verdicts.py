@@ -116,8 +116,8 @@ def why_open(far: Effect, factor: float = 1.0) -> str:
     ': other sign against simulation-dt/8'
     """
     p, turned = far.p_value(factor), ", ".join(far.turned_by(factor))
-    seen = p is not None and p < LEVEL and abs(far.above(factor)) > far.uncertainty
-    return untested(far) or (f": other sign against {turned}" if turned and seen else "")
+    clear = p is not None and p < LEVEL and abs(far.above(factor)) > far.uncertainty
+    return untested(far) or (f": other sign against {turned}" if turned and clear else "")
 
 
 def _standing_of_range(far: Effect, factor: float) -> str:

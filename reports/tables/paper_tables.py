@@ -55,10 +55,10 @@ def _samples(run: Run, methods: Sequence[str], metric: str) -> Mapping[str, pd.S
 
 def _mean(means: pd.Series, method: str, metric: str, frames: pd.Series) -> float | None:
     """Return the mean over these frames of (method, metric, scene) -> mean; None where a scene lacks it."""
-    known = means.get((method, metric))
-    if known is None or not frames.index.isin(known.index).all():
+    values = means.get((method, metric))
+    if values is None or not frames.index.isin(values.index).all():
         return None
-    return float(np.average(known[frames.index], weights=frames))
+    return float(np.average(values[frames.index], weights=frames))
 
 
 def _energies(run: Run, means: pd.Series, name: str, pbns: str, snug: str) -> list[Table]:

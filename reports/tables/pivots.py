@@ -72,8 +72,8 @@ def pivot(
     frame: rows of the run; those that failed say what a mean lacks. name: of the table that the metrics
     declare. keys: columns of results.csv that name a line, the last of them "method".
     """
-    wanted = frame[frame["table"] == name]
-    usable = set(wanted[wanted["usable"]]["metric"])
+    table_rows = frame[frame["table"] == name]
+    usable = set(table_rows[table_rows["usable"]]["metric"])
     metrics = [metric for metric in run.metrics.values() if metric.name in usable]
     if not metrics:
         return [], []
@@ -81,7 +81,7 @@ def pivot(
     wide = cells.unstack("metric", sort=False).astype(object)
     wide = wide.where(wide.notna(), None)[[metric.name for metric in metrics]]
     methods = {method: place for place, method in enumerate(run.ordered(wide.index.get_level_values(-1)))}
-    garments = {garment: place for place, garment in enumerate(run.garments(wanted))}
+    garments = {garment: place for place, garment in enumerate(run.garments(table_rows))}
     outer = {key[:-1]: place for place, key in reversed(list(enumerate(wide.index)))}
     last = len(keys) - 1
 
@@ -115,8 +115,8 @@ def ablation_effects(run: Run) -> list[Table]:
         "excess, in points."
     )
     note = "Below: 95 % intervals over motions and seeds; of points with the mean nearer to 0 held."
-    shown = [relative_metric(metric.name) if metric.arbitrary_zero else metric for metric in metrics]
-    columns = (GARMENT, METHOD, *map(metric_column, shown))
+    heads = [relative_metric(metric.name) if metric.arbitrary_zero else metric for metric in metrics]
+    columns = (GARMENT, METHOD, *map(metric_column, heads))
     return table("ablation_effects", columns, lines, caption, grouped_by=("garment",), note=note)
 
 
@@ -128,8 +128,8 @@ OTHERS, MEAN_BODY = "other shapes", "mean shape"
 def shapes(run: Run) -> list[Table]:
     """Tabulate each method on all other bodies together and on the mean body, with its relative excess."""
     cells = run.cells("shapes")
-    known = cells[(cells["metric"] == SHAPE) & cells["usable"]]
-    norms = known.drop_duplicates("scene").set_index("scene")["value"]
+    shapes = cells[(cells["metric"] == SHAPE) & cells["usable"]]
+    norms = shapes.drop_duplicates("scene").set_index("scene")["value"]
     rows = cells[cells["scene"].isin(norms.index)]
     metrics = [run.metrics[name] for name in METRICS if name in run.metrics]
     if norms.nunique() < 2 or not metrics:

@@ -36,7 +36,7 @@ from reports.statistics.effects import RATIO
 from reports.statistics.means_and_spreads import mean_of
 from reports.statistics.outcomes import PUBLISHED, read_published
 from reports.statistics.paper_claims import EXPLORATORY, PRIMARY, UNSEEN, Claim, Judged, judged
-from reports.statistics.pareto import NETWORK, compared_scenes, fastest, points_of, truncated
+from reports.statistics.pareto import NETWORK, WHOLE, compared_scenes
 from reports.statistics.relative_excess import excess_of, with_relative_excess
 from reports.statistics.verdicts import measure_of
 from reports.tables import make_tables
@@ -49,6 +49,7 @@ TIMED = ("quick",)  # runs with nothing beside them, which judge claims on times
 TIMES = ("s", "ms")  # units
 FAMILIES = {"primary": PRIMARY, "exploratory": EXPLORATORY}
 SWING, ALIKE = "dynamics/amplitude", "dynamics/correlation"
+SUPERVISED, PBNS = "supervised", "pbns"
 Rows = Sequence[Sequence[str]]
 
 
@@ -61,20 +62,20 @@ def published_part(request: str) -> str:
     """
     what, _, source = request.partition(" of ")
     names, *lists = source.split(";")
-    wanted, methods = (_words(text) for text in (*lists, "", "")[:2])
+    columns, methods = (_words(text) for text in (*lists, "", "")[:2])
     folders = [PUBLISHED / name for name in _words(names)]
     kind, _, name = what.partition(" ")
     if (part := request.partition(";")[0]) in PARTS:
-        return markdown_table(chosen_rows(PARTS[part](), wanted))
+        return markdown_table(chosen_rows(PARTS[part](), columns))
     if what == "table overview" and methods:
-        return markdown_table(_overview(folders, wanted, methods))
+        return markdown_table(_overview(folders, columns, methods))
     forms: dict[str, Callable[[], str | Rows]] = {
         "docstring": lambda: docstring_rows(source),
         "front": lambda: front_sentences(read_published(folders[0])),
-        "table": lambda: _table(folders[0], name, wanted, methods),
+        "table": lambda: _table(folders[0], name, columns, methods),
         "claims": lambda: claim_rows(name, folders),
         "runs": lambda: run_rows(folders),
-        "times": lambda: time_rows([(read_published(f), _made(f, "cost")) for f in folders], wanted),
+        "times": lambda: time_rows([(read_published(f), _made(f, "cost")) for f in folders], columns),
     }
     if kind not in forms:
         raise ValueError(f"no part is generated from '{request}'; known: {', '.join((*forms, *PARTS))}")
@@ -132,35 +133,38 @@ def front_sentences(run: Run) -> str:
     """Return the verdict on SNUG and two bullets, as Markdown.
 
     Args:
-        run: has SNUG, PBNS and the supervised network in whole motions, and SNUG beside solvers in clips.
+        run: has SNUG, PBNS, the supervised network and a solver stopped early in whole motions.
 
     Raises:
-        ValueError: a number of these is missing.
+        KeyError: the method or claim of which a number is missing.
     """
     worn, cells = run.garment_rows, run.cells("speed", "garments")
+    timed = cells[cells["scene"].isin(compared_scenes(run, cells))]
     rows = with_relative_excess(run, worn)
-    snug, pbns, supervised = (excess_of(run, rows, name) for name in (NETWORK, "pbns", "supervised"))
-    p = next((line.p for line in judged(run) if line.claim.says == UNSEEN), None)
-    swing, alike = (mean_of(worn, NETWORK, name) for name in (SWING, ALIKE))
-    points = points_of(run, cells, compared_scenes(run, cells), "gap/energy")
-    network = next((point for point in points if point.method == NETWORK), None)
-    solver = fastest(truncated(run, points), network.error) if network else None
-    if not (snug and pbns and supervised and p and swing and alike and network and solver):
-        raise ValueError(
-            "the run lacks SNUG, PBNS, the supervised network, or their times beside solvers"
-        )
-    worst, most = snug.worst
-    return "\n".join([
-        f"**{verdict(run, worn)}**",
-        "",
-        f"- Good at: energy for its time. Supervised leaves {number(supervised.typical, 2)} % of that excess "
-        f"(p {number(p, 2)}, paired by motion), PBNS {number(pbns.typical, 2)} %; the fastest solver as "
-        f"accurate a frame, {run.label(solver.method)}, takes {number(solver.time / network.time, 1)} times "
-        "as long.",
-        f"- Bad at: dynamics and unfamiliar motion. Its hem's correlation with the simulation's is "
-        f"{number(alike.value, 2)}, its amplitude {number(100.0 * swing.value, 1)} %; the worst motion, "
-        f"{worst.partition('/')[2]}, keeps {number(most, 2)} %.",
-    ])  # fmt: skip
+    solver = next((name for name in run.with_role("solver") if name in {*worn["method"]}), "")
+    names = (NETWORK, SUPERVISED, PBNS, solver)
+    excesses = {name: excess for name in names if (excess := excess_of(run, rows, name))}
+    p_values = {line.claim.says: line.p for line in judged(run) if line.p is not None}
+    alike, swing, times = (
+        {name: mean.value for name in names if (mean := mean_of(of, name, metric))}
+        for of, metric in ((worn, ALIKE), (worn, SWING), (timed, WHOLE))
+    )
+    supervised, pbns, stopped = (f"{number(excesses[name].typical, 2)} %" for name in names[1:])
+    worst, most = excesses[NETWORK].worst
+    lines = (
+        f"**{verdict(run, worn)}**\n",
+        f"- Good at: energy for its time. Supervised has {supervised} "
+        f"(p {number(p_values[UNSEEN], 2)} against SNUG, paired by motion), "
+        f"PBNS {pbns}; "
+        f"{run.label(solver)}, has {stopped} and takes "
+        f"{number(times[solver] / times[NETWORK], 1)} times as long.",
+        "- Bad at: dynamics and unfamiliar motion. Its hem's correlation with the simulation's "
+        f"is {number(alike[NETWORK], 2)} "
+        f"(Supervised {number(alike[SUPERVISED], 2)}), "
+        f"its amplitude {number(100.0 * swing[NETWORK], 1)} % of the simulation's; "
+        f"in the worst motion, {worst.partition('/')[2]}, it has {number(most, 2)} %.",
+    )
+    return "\n".join(lines)
 
 
 def run_rows(folders: Sequence[Path]) -> Rows:
@@ -182,9 +186,9 @@ def _overview(folders: Sequence[Path], wanted: Sequence[str], methods: Sequence[
     heads: list[str] = []
     rows: dict[str, list[str]] = {}
     for run in map(read_published, folders):
-        chosen = [name for name in methods if name in run.methods and name not in rows]
-        heads, *lines = text_rows(run, overview(run, chosen)[0], wanted)
-        rows |= dict(zip(run.ordered(chosen), lines))
+        missing = [name for name in methods if name in run.methods and name not in rows]
+        heads, *lines = text_rows(run, overview(run, missing)[0], wanted)
+        rows |= dict(zip(run.ordered(missing), lines))
     return [heads, *(rows[name] for name in methods)]
 
 

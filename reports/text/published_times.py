@@ -36,9 +36,9 @@ def time_rows(costs: Sequence[tuple[Run, Table]], methods: Sequence[str]) -> lis
             method, *means = (row[places[name]] for name in ("method", *OURS))
             here = [number(mean.value if isinstance(mean, Mean) else None) for mean in means]
             measured[str(method)] = run.label(str(method)), *here
-    known = {name: rows.to_numpy().tolist() for name, rows in published.groupby("method", sort=False)}
+    sources = {name: rows.to_numpy().tolist() for name, rows in published.groupby("method", sort=False)}
     rows: list[tuple[str, ...]] = [HEADS]
-    for name in dict.fromkeys([*methods, *(name for name in known if name not in measured)]):
+    for name in dict.fromkeys([*methods, *(name for name in sources if name not in measured)]):
         label, *here = measured.get(name, (name, *[DASH] * 3))
-        rows += [(label, *how, *here) for _, *how in known.get(name, [[name, *[DASH] * 3]])]
+        rows += [(label, *how, *here) for _, *how in sources.get(name, [[name, *[DASH] * 3]])]
     return rows
