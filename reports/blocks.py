@@ -34,9 +34,10 @@ class Report:
 
     @property
     def subtitle(self) -> str:
-        """Preset, commit or version, and day of the run."""
+        """Study, commit or version, and day of the run."""
         config = self.run.config
-        parts = [f"preset {config['preset']}"] if config.get("preset") else []
+        study = (config.get("study") or {}).get("name")
+        parts = [f"study {study}"] if study else []
         if made_by := str(config.get("commit") or ""):  # an installed package knows its version alone
             parts += [made_by if made_by.startswith("version ") else f"commit {made_by}"]
         parts += [str(config["started"])[:10]] if config.get("started") else []

@@ -122,8 +122,7 @@ def content(report: Report) -> dict[str, Any]:
     return {
         "title": "Neural garments versus a reference solver",
         "subtitle": report.subtitle,
-        # That of a smoke test says that its numbers mean nothing.
-        "size": str((config.get("preset_values") or {}).get("description") or ""),
+        "question": str((config.get("study") or {}).get("question") or ""),
         "warnings": ". ".join([*run.warnings, ""]).strip(),
         "verdict": sentences.pop("Verdict", ""),
         "sentences": list(sentences.items()),

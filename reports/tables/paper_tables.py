@@ -87,12 +87,14 @@ def _energies(run: Run, means: pd.Series, name: str, pbns: str, snug: str) -> li
 
 
 def _curvature(run: Run, means: pd.Series, name: str, base: str) -> list[Table]:
-    """Tabulate curvature with the full loss and without each term.
+    """Tabulate curvature with the full loss and without each term; nothing of a run without such a loss.
 
     Below stand the other members of the reference's family, whose errors are a floor.
     """
     named = {term: f"{base}-no-{term}" if term else base for term in TABLE_2}
     variants = {term: method for term, method in named.items() if method in {base, *run.methods}}
+    if len(variants) == 1:
+        return []
     lines: list[tuple[Cell, ...]] = []
     for motions, frames in _samples(run, tuple(variants.values()), CURVATURE[0]).items():
         values = {

@@ -49,7 +49,6 @@ TIMED = ("quick",)  # runs with nothing beside them, which judge claims on times
 TIMES = ("s", "ms")  # units
 FAMILIES = {"primary": PRIMARY, "exploratory": EXPLORATORY}
 SWING, ALIKE = "dynamics/amplitude", "dynamics/correlation"
-SUPERVISED, PBNS = "supervised", "pbns"
 Rows = Sequence[Sequence[str]]
 
 
@@ -142,7 +141,7 @@ def front_sentences(run: Run) -> str:
     timed = cells[cells["scene"].isin(compared_scenes(run, cells))]
     rows = with_relative_excess(run, worn)
     solver = next((name for name in run.with_role("solver") if name in {*worn["method"]}), "")
-    names = (NETWORK, SUPERVISED, PBNS, solver)
+    names = (NETWORK, "supervised", "pbns", solver)
     excesses = {name: excess for name in names if (excess := excess_of(run, rows, name))}
     p_values = {line.claim.says: line.p for line in judged(run) if line.p is not None}
     alike, swing, times = (
@@ -160,7 +159,7 @@ def front_sentences(run: Run) -> str:
         f"{number(times[solver] / times[NETWORK], 1)} times as long.",
         "- Bad at: dynamics and unfamiliar motion. Its hem's correlation with the simulation's "
         f"is {number(alike[NETWORK], 2)} "
-        f"(Supervised {number(alike[SUPERVISED], 2)}), "
+        f"(Supervised {number(alike['supervised'], 2)}), "
         f"its amplitude {number(100.0 * swing[NETWORK], 1)} % of the simulation's; "
         f"in the worst motion, {worst.partition('/')[2]}, it has {number(most, 2)} %.",
     )

@@ -5,15 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.meshes import sphere, square_sheet
+from benchmarks.meshes import square_sheet
 from benchmarks.methods.sweeps import XPBD, VertexBlockDescent, block
 from benchmarks.methods.warm_started import SHARE, given_frames
 from benchmarks.metrics.energy import first_guess
 from benchmarks.scenes.sheets import exact_fall
-from reference_sim import Cloth, Material, Obstacle, Potential, simulate
+from reference_sim import Cloth, Material, Potential, simulate
 from reference_sim.energies import (
-    BendHinge,
-    ContactPenalty,
     Gravity,
     Inertia,
     Step,
@@ -25,23 +23,12 @@ from reference_sim.energies.stretch_stvk import strain
 from reference_sim.kernels.fast_kernels import SCRATCH_SHAPE, step_terms
 from reference_sim.minimise.newton import Newton
 from tests.benchmarks.runner.tasks_by_hand import simulated, small_scene
-
-DT = 1 / 30
+from tests.reference_sim.pressed_sheet import DT, pressed
 
 
 @pytest.fixture(scope="module")
 def touching():
-    """A potential of all terms in the midst of a step, a pinned sheet pressed into a sphere; its guess."""
-    positions, faces = square_sheet(6, 0.3)
-    positions[:, 1] += 0.098
-    cloth = Cloth(positions, faces, Material(), pins=(0, 6))
-    terms = [StretchStVK(cloth), BendHinge(cloth, rest_angles=0.1), Gravity(cloth), ContactPenalty(cloth)]
-    potential = Potential([*terms, Inertia(cloth, DT)])
-    velocity = np.random.default_rng(1).normal(0, 0.2, positions.shape)
-    velocity[cloth.pins] = 0.0
-    guess = positions + DT * velocity
-    potential.prepare(Step(positions, velocity, guess, DT, Obstacle(*sphere(0.1, 12))))
-    return potential, guess
+    return pressed(cells=6)
 
 
 def test_the_block_of_a_vertex_is_that_of_the_potential(touching):

@@ -5,41 +5,17 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.meshes import sphere, square_sheet
-from reference_sim import Cloth, Material, Obstacle, Potential
-from reference_sim.energies import BendHinge, ContactPenalty, Gravity, Inertia, Step, StretchStVK
 from reference_sim.minimise import lbfgs
 from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS, evaluate
 from reference_sim.minimise.lbfgs import LBFGS
 from reference_sim.minimise.newton import Newton
-
-DT = 1 / 30
-
-
-def pressed(seed: int, *, pins: tuple[int, ...] = (0, 6)) -> tuple[Potential, np.ndarray]:
-    """All terms in the midst of a step, a moving sheet pressed into a sphere; its guess."""
-    positions, faces = square_sheet(9, 0.3)
-    positions[:, 1] += 0.098
-    cloth = Cloth(positions, faces, Material(), pins=pins)
-    angles = np.random.default_rng(seed).uniform(-1, 1, len(cloth.hinges))
-    terms = [
-        StretchStVK(cloth),
-        BendHinge(cloth, rest_angles=angles),
-        Gravity(cloth),
-        ContactPenalty(cloth),
-    ]
-    potential = Potential([*terms, Inertia(cloth, DT)])
-    velocity = np.random.default_rng(seed + 1).normal(0, 0.2, positions.shape)
-    velocity[cloth.pins] = 0.0
-    guess = positions + DT * velocity
-    potential.prepare(Step(positions, velocity, guess, DT, Obstacle(*sphere(0.1, 12))))
-    return potential, guess
+from tests.reference_sim.pressed_sheet import pressed
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-3, 2e-2])
-def test_each_energy_and_its_gradient_is_that_of_its_definition(size, seed=1):
-    potential, x0 = pressed(seed)
-    u = np.random.default_rng(seed).normal(0, size, x0.shape).astype(np.float32).astype(float)
+def test_each_energy_and_its_gradient_is_that_of_its_definition(size):
+    potential, x0 = pressed()
+    u = np.random.default_rng(1).normal(0, size, x0.shape).astype(np.float32).astype(float)
     solver, gradient = CompiledLBFGS(potential, max_iterations=1), np.empty(u.size, np.float32)
     energies, shift = np.zeros_like(solver._energies), u.astype(np.float32).ravel()
     target = (solver._terms.inertia.x_hat - x0).astype(np.float32).ravel()
@@ -56,7 +32,7 @@ def test_each_energy_and_its_gradient_is_that_of_its_definition(size, seed=1):
 
 @pytest.mark.parametrize("iterations", [1, 10])
 def test_iterations_are_those_of_the_exact_solver(iterations):
-    potential, guess = pressed(1)
+    potential, guess = pressed()
     exact = LBFGS(potential, max_iterations=iterations, finish=False).minimise(guess)
     descent = CompiledLBFGS(potential, max_iterations=iterations).minimise(guess)
     assert descent.iterations == iterations == exact.iterations and descent.status == "max_iterations"
@@ -70,7 +46,7 @@ def test_iterations_are_those_of_the_exact_solver(iterations):
 
 
 def test_what_begins_in_float32_ends_in_a_minimum_of_float64(monkeypatch):
-    potential, guess = pressed(1)
+    potential, guess = pressed()
     descent = LBFGS(potential).minimise(guess)
     monkeypatch.setattr(lbfgs, "LARGEST_COMPILED", 0)
     in_float64 = LBFGS(potential).minimise(guess)
@@ -83,7 +59,7 @@ def test_what_begins_in_float32_ends_in_a_minimum_of_float64(monkeypatch):
 
 
 def test_a_minimiser_that_served_gives_the_bits_of_a_new_one():
-    potential, guess = pressed(1)
+    potential, guess = pressed()
     torn = np.random.default_rng(0).normal(0, 0.1, guess.shape) * potential.cloth.free[:, None]
     for make in (LBFGS, lambda potential: CompiledLBFGS(potential, max_iterations=3)):
         served, new = make(potential), make(potential).minimise(guess).positions

@@ -107,5 +107,7 @@ def test_each_frame_weighs_the_same_on_the_papers_clips_and_on_all_motions():
     assert two[0] == (clips, "full loss", 2.0, 1.0, 2.0, 2.0, 2.7, 1.0)
     assert two[1] == (clips, "without strain", 14.0, 7.0, 14.0, 14.0, 19.1, 19.1 / 2.7)
     assert two[2][2:] == (pytest.approx(0.2), None, pytest.approx(0.2), pytest.approx(0.2), None, None)
+    full = [r for r in rows if r.method != "snug-paper-no-strain"]
+    assert len(paper_tables(replace(run_of(full), frame_energies=frames))) == 1
     heading = next(place for place, block in enumerate(BLOCKS) if isinstance(block, Heading))
     assert {table.name for table in made} < {block.name for block in BLOCKS[:heading]}  # page one
