@@ -65,7 +65,7 @@ def verdict(run: Run, worn: pd.DataFrame) -> str:
     motion = "motion" + f" of the {run.first_garment}" * several
     text = (
         f"In {'a typical' if len(scenes) > 1 else 'one'} {_kind(run, scenes)}{motion} {run.label(name)} "
-        f"has {number(excess.typical, 2)} % of skinning's excess energy, that above a converged simulation"
+        f"has {number(excess.typical, 2)} % of skinning's excess energy over a converged simulation"
     )
     text += f" ({number(excess.pooled, 2)} % summed over all motions)" if len(scenes) > 1 else ""
     if times := _times_faster(run, name):

@@ -15,7 +15,7 @@ BESIDE = [*on_two_scenes("simulation", 0.5, 7.0), *on_two_scenes("skinning", 10.
 SNUG = on_two_scenes("snug", 1.0, 9.0)  # 5 and 20 % of skinning's excess
 PBNS = on_two_scenes("pbns", 1.5, 10.0)
 SENTENCES = """\
-Verdict: In a typical unseen motion SNUG has 10 % of skinning's excess energy, that above a converged
+Verdict: In a typical unseen motion SNUG has 10 % of skinning's excess energy over a converged
 simulation (12 % summed over all motions).
 How certain: Of 1 test of primary claims of the paper 1 is inconclusive with one seed; in the published run 6
 hold, 2 do not hold, 1 is inconclusive."""
