@@ -150,9 +150,9 @@ def errors_in_spreads(run: Run) -> list[Table]:
                 lines.append((garment, method, *values))
     columns = (GARMENT, METHOD, *(Column(metric.name, _error_title(metric)) for metric in metrics))
     caption = (
-        "Each number is an error against the reference, root mean square over seeds, divided by the same "
-        "error of the equally valid simulations; both are means over motions. 1 means: as near as another "
-        "valid simulation."
+        "Each number is an error against the reference (of correlation: 1 - correlation), root mean square "
+        "over seeds, divided by that of the same simulation started 0.1 mm apart; both are means over the "
+        "motions in which that converged. 1 means: as near as that."
     )
     return table("errors_in_spreads", columns, lines, caption, grouped_by=("garment",))
 

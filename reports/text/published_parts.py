@@ -153,7 +153,7 @@ def front_sentences(run: Run) -> str:
     lines = (
         f"**{verdict(run, worn)}**\n",
         f"- Good at: energy for its time. Supervised has {supervised} "
-        f"(p {number(p_values[UNSEEN], 2)} against SNUG, paired by motion), "
+        f"(against SNUG p {number(p_values[UNSEEN], 2)}, corrected), "
         f"PBNS {pbns}; "
         f"{run.label(solver)}, has {stopped} and takes "
         f"{number(times[solver] / times[NETWORK], 1)} times as long.",
@@ -161,7 +161,7 @@ def front_sentences(run: Run) -> str:
         f"is {number(alike[NETWORK], 2)} "
         f"(Supervised {number(alike['supervised'], 2)}), "
         f"its amplitude {number(100.0 * swing[NETWORK], 1)} % of the simulation's; "
-        f"in the worst motion, {worst.partition('/')[2]}, it has {number(most, 2)} %.",
+        f"worst energy excess: {number(most, 2)} %, in {worst.partition('/')[2]}.",
     )
     return "\n".join(lines)
 
