@@ -44,7 +44,7 @@ from specimens import (
 )
 
 HERE = Path(__file__).parent
-PUBLISHED = HERE.parents[1] / "reports" / "published" / "fabric" / "results.csv"
+PUBLISHED = HERE.parents[1] / "reports" / "published" / "fabric" / "results.csv.gz"
 SNUG = find_fabric("snug")
 TINY = replace(find_preset("smoke"), sheet_cells=6, sheet_frames=12)
 
