@@ -34,10 +34,11 @@ class Report:
 
     @property
     def subtitle(self) -> str:
-        """Study, commit or version, and day of the run."""
+        """Study, sizes, commit or version, and day of the run."""
         config = self.run.config
         study = (config.get("study") or {}).get("name")
         parts = [f"study {study}"] if study else []
+        parts += [f"sizes {config['preset']}"] if config.get("preset") else []
         if made_by := str(config.get("commit") or ""):  # an installed package knows its version alone
             parts += [made_by if made_by.startswith("version ") else f"commit {made_by}"]
         parts += [str(config["started"])[:10]] if config.get("started") else []

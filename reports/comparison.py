@@ -144,12 +144,12 @@ def compare(
         machines = [m.name for run in (one, other) for m in run.metrics.values() if m.of == "machine"]
         of_metrics = [frame[~frame["metric"].isin(machines)] for frame in of_metrics]
     lost = [] if shared else gone(*of_metrics)
-    pairs = _shared(of_metrics, *CELL)
-    if pairs[0].empty:
+    both = _shared(of_metrics, *CELL)
+    if both[0].empty:
         raise ResultsError(
             "the two runs share no such scene, method, seed and metric: nothing to compare"
         )
-    before, after = (frame.set_index(CELL)["protocol"] for frame in pairs)
+    before, after = (frame.set_index(CELL)["protocol"] for frame in both)
     differ = before[before != after.reindex(before.index)]
     if len(differ):
         place = " x ".join(map(str, differ.index[0][:2]))
@@ -159,8 +159,8 @@ def compare(
         )
     drawn = _of_one_seed(*of_metrics)
     alone = set(drawn[1]["method"])
-    pairs = [frame[~(frame["seeded"] & frame["method"].isin(alone))] for frame in pairs]
-    judged, compared = _means(one, *_without_more_noise(*pairs), basis=cells[0])
+    both = [frame[~(frame["seeded"] & frame["method"].isin(alone))] for frame in both]
+    judged, compared = _means(one, *_without_more_noise(*both), basis=cells[0])
     earlier, later = _with_known_zero(one, *drawn, basis=cells[0])
     of_one_seed = changed_scenes(earlier, later, _metrics(one))
     order = (GONE, WORSE, BETTER, OTHER)

@@ -89,14 +89,14 @@ class Scored:
         timed = rows[(rows["method"] == self.method) & (rows["metric"] == TIME)]
         declared = (timed["reason"] == DECLARED).any()
         clock = "declared" if declared else "measured" if len(timed) else "unknown"
-        answer: Cell = None
+        energy: Cell = None
         if excess is not None:  # an interval over fewer motions says nothing
-            answer = excess.effect if excess.effect.motions >= LEAST_MOTIONS else excess.typical
+            energy = excess.effect if excess.effect.motions >= LEAST_MOTIONS else excess.typical
         config = self.run.config
         hashes = config.get("roll_outs") if self.folder else None
         origin = (config.get("commit") or "", (config.get("date") or config.get("started") or "")[:10])
         of = sha256("".join(hashes.values()).encode()).hexdigest()[:8] if hashes else ""
-        return (None, self.title, answer, *numbers, clock, self.learned_from, self.proof(), *origin, of)
+        return (None, self.title, energy, *numbers, clock, self.learned_from, self.proof(), *origin, of)
 
 
 def of_entry(folder: Path) -> Scored:

@@ -46,8 +46,8 @@ def select_roll_outs(
     cloths = {}
     for method in methods:
         of_method = rows[rows["method"] == method]
-        first_seed = of_method["seed"].min() if seed is None or not of_method["seeded"].any() else seed
-        cloth = run.roll_outs.cloth(scene, method, int(first_seed)) if len(of_method) else None
+        shown_seed = of_method["seed"].min() if seed is None or not of_method["seeded"].any() else seed
+        cloth = run.roll_outs.cloth(scene, method, int(shown_seed)) if len(of_method) else None
         if cloth is None or not cloth.finite().frames:
             stored = sorted(path.parent.name for path in folder.trajectories.glob("*/*.vtkhdf"))
             reason = (

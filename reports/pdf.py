@@ -122,7 +122,6 @@ def content(report: Report) -> dict[str, Any]:
     return {
         "title": "Neural garments versus a reference solver",
         "subtitle": report.subtitle,
-        "question": str((config.get("study") or {}).get("question") or ""),
         "warnings": ". ".join([*run.warnings, ""]).strip(),
         "verdict": sentences.pop("Verdict", ""),
         "sentences": list(sentences.items()),

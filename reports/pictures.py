@@ -122,13 +122,13 @@ def _covered(corners: np.ndarray, w: int, h: int) -> tuple[np.ndarray, np.ndarra
     weights: list[np.ndarray] = []
     for slope, start in zip(slopes, starts):
         weight = start[triangle] + slope[triangle, 0] * x + slope[triangle, 1] * y
-        hits = weight >= 0.0
-        triangle, x, y = triangle[hits], x[hits], y[hits]
-        weights = [one[hits] for one in (*weights, weight)]
+        within = weight >= 0.0
+        triangle, x, y = triangle[within], x[within], y[within]
+        weights = [one[within] for one in (*weights, weight)]
     weights.insert(0, 1.0 - weights[0] - weights[1])
-    hits = weights[0] >= 0.0
-    triangle, x, y = triangle[hits], x[hits] + low[triangle[hits], 0], y[hits] + low[triangle[hits], 1]
-    return y * w + x, faces[triangle], np.stack([weight[hits] for weight in weights], axis=1)
+    left = weights[0] >= 0.0
+    triangle, x, y = triangle[left], x[left] + low[triangle[left], 0], y[left] + low[triangle[left], 1]
+    return y * w + x, faces[triangle], np.stack([weight[left] for weight in weights], axis=1)
 
 
 INERTIA = "energy/inertia"
@@ -174,10 +174,10 @@ def camera_path(selected: SceneRollOuts, axes: np.ndarray) -> tuple[np.ndarray, 
     """Return the camera's target in each frame (T,3) [m], smoothed, and half the height that it sees [m]."""
     cloths = selected.series.values()
     frames = max(cloth.frames for cloth in cloths)
-    views = [cloth.positions @ axes for cloth in cloths]
+    paths = [cloth.positions @ axes for cloth in cloths]
     low, high = (
         [np.pad(ends, ((0, frames - len(ends)), (0, 0)), mode="edge") for ends in corners]
-        for corners in ([x.min(axis=1) for x in views], [x.max(axis=1) for x in views])
+        for corners in ([x.min(axis=1) for x in paths], [x.max(axis=1) for x in paths])
     )
     lowest, highest = np.min(low, axis=0), np.max(high, axis=0)
     dt = selected.longest.dt

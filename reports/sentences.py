@@ -84,7 +84,7 @@ def _times_faster(run: Run, name: str) -> int:
     faster = compare_methods(run, timed, metric, run.reference, name).effect if metric else None
     least = min(faster.interval or (faster.shown,)) if faster else 0.0
     power = 10 ** math.floor(math.log10(least)) if least > 1.0 else 1
-    return power * math.floor(least / power)  # one digit: the simulation's time is uncertain by half
+    return power * math.floor(least / power)  # one digit: the simulation is timed once
 
 
 def likeness(correlation: float) -> str:

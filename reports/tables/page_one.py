@@ -33,20 +33,20 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     plain = set(rows_of_garment[rows_of_garment["usable"]]["method"]) - run.standing_apart(
         rows_of_garment
     )
-    leaders = leads(run, rows_of_garment)
+    listed = leads(run, rows_of_garment)
     others = [m for m in run.ordered(plain) if run.methods[m].role in ("network", EXTERNAL)]
     others += [m for m in run.ordered(plain) if run.methods[m].role == "baseline"]
     # Of a family of networks the last one: that of the highest level.
     last = {run.methods[m].family: m for m in others}
-    leaders += [m for m in last.values() if m not in leaders]
+    listed += [m for m in last.values() if m not in listed]
     best = rivals(run, cells, scenes) if scenes else []
-    solvers = [m for m in best if m not in leaders]
-    leaders = run.ordered(methods or [*leaders[: ROWS - len(solvers)], *solvers])
-    names = [(name, rows_of_garment) for name in ANSWERS] + [(GAP, timed), (run_time(timed), timed)]
-    names += [("cost/train", rows_of_garment)]
-    pairs = [(run.metrics[name], rows) for name, rows in names if name in run.metrics]
+    solvers = [m for m in best if m not in listed]
+    listed = run.ordered(methods or [*listed[: ROWS - len(solvers)], *solvers])
+    requests = [(name, rows_of_garment) for name in ANSWERS] + [(GAP, timed), (run_time(timed), timed)]
+    requests += [("cost/train", rows_of_garment)]
+    metric_rows = [(run.metrics[name], rows) for name, rows in requests if name in run.metrics]
     with_excess = with_relative_excess(run, rows_of_garment)
-    excess = {name: excess_of(run, with_excess, name) for name in leaders if name != run.reference}
+    excess = {name: excess_of(run, with_excess, name) for name in listed if name != run.reference}
     own_excess = {m: own_excess_of(run, rows_of_garment, m) for m in excess if m != SKINNING}
     shares: dict[str, tuple[Cell, Cell]] = {
         name: (own_excess.get(name, of.effect), of.effect) for name, of in excess.items() if of
@@ -55,14 +55,14 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     lines: list[tuple[Cell, ...]] = [
         (
             method, *shares.get(method, (None, None)),
-            *(mean_of(rows, method, metric.name) for metric, rows in pairs),
+            *(mean_of(rows, method, metric.name) for metric, rows in metric_rows),
         )
-        for method in leaders
+        for method in listed
     ]  # fmt: skip
     columns = [
         Column("own_excess", "Excess in own energies", "%", digits=2),
         Column("relative_excess", "Relative excess", "%", digits=2),
-        *(metric_column(metric) for metric, _ in pairs),
+        *(metric_column(metric) for metric, _ in metric_rows),
     ]  # fmt: skip
     places = [k for k in range(1, len(columns) + 1) if any(line[k] is not None for line in lines)]
     lines = [(line[0], *(line[k] for k in places)) for line in lines]

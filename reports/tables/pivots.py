@@ -128,8 +128,8 @@ OTHERS, MEAN_BODY = "other shapes", "mean shape"
 def shapes(run: Run) -> list[Table]:
     """Tabulate each method on all other bodies together and on the mean body, with its relative excess."""
     cells = run.cells("shapes")
-    shapes = cells[(cells["metric"] == SHAPE) & cells["usable"]]
-    norms = shapes.drop_duplicates("scene").set_index("scene")["value"]
+    shape_rows = cells[(cells["metric"] == SHAPE) & cells["usable"]]
+    norms = shape_rows.drop_duplicates("scene").set_index("scene")["value"]
     rows = cells[cells["scene"].isin(norms.index)]
     metrics = [run.metrics[name] for name in METRICS if name in run.metrics]
     if norms.nunique() < 2 or not metrics:
