@@ -87,8 +87,8 @@ def against_published(run: Run, published: Path = PUBLISHED) -> str:
     if not comparison.changes:
         return f"published: reproduced ({comparison.compared} means)"
     rows = dict.fromkeys(f"{run.label(c.method)} in {c.place}" for c in comparison.changes)
-    first_changes = ", ".join([*rows][:MOST_CHANGES]) + ", ..." * (len(rows) > MOST_CHANGES)
-    return f"published: {len(comparison.changes)} numbers differ: {first_changes}"
+    names = ", ".join([*rows][:MOST_CHANGES]) + ", ..." * (len(rows) > MOST_CHANGES)
+    return f"published: {len(comparison.changes)} numbers differ: {names}"
 
 
 MOST_METHODS, MOST_CHANGES = 16, 8  # lines without --metrics or --methods

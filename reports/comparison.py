@@ -192,9 +192,9 @@ def _headline(
             before, after = (_value(run, frame, method, metric) for frame in worn)
             verdicts = {c.place: c.verdict for c in changes if (c.method, c.metric) == (method, metric)}
             scenes = " and ".join(sorted({f"{change} in a scene" for change in verdicts.values()}))
-            words = verdicts.get(garment) or scenes or verdict
-            complete = before is not None and after is not None
-            cells.append(f"{number(before)} → {number(after)} {words}" if complete else DASH)
+            note = verdicts.get(garment) or scenes or verdict
+            whole = before is not None and after is not None
+            cells.append(f"{number(before)} → {number(after)} {note}" if whole else DASH)
         if set(cells) != {DASH}:
             rows[method] = cells
     return rows

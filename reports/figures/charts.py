@@ -70,9 +70,9 @@ def curves_of(run: Run, points: Iterable[Point]) -> list[Curve]:
     one and the same method. Variants of the reference are left out.
     """
     points = list(points)
-    visible = [p for p in points if run.methods[p.method].role != OF_REFERENCE] or points
+    marks = [p for p in points if run.methods[p.method].role != OF_REFERENCE] or points
     groups: dict[tuple[bool, str], list[Point]] = {}
-    for point in visible:
+    for point in marks:
         method = run.methods[point.method]
         solver = method.level is not None and method.role in ("solver", STARTED)
         key = (True, method.base) if solver else (False, method.family)
@@ -126,10 +126,10 @@ def draw_points(
     if len(best) > 1:
         axes.plot([p.time for p in best], [p.error for p in best], color=FRONT, linewidth=5.0, zorder=1)
     for curve in curves:
-        visible = [point for point in curve.points if point.error > least]
-        times, errors = [point.time for point in visible], [point.error for point in visible]
+        marks = [point for point in curve.points if point.error > least]
+        times, errors = [point.time for point in marks], [point.error for point in marks]
         axes.plot(times, errors, color=curve.look.colour, linestyle=curve.look.line, linewidth=1.1)
-        for point in (*visible, *(point for point in curve.aside if point.error > least)):
+        for point in (*marks, *(point for point in curve.aside if point.error > least)):
             colour = GREY if point.error < band else curve.look.colour
             pale = point in curve.aside
             _draw_marker(axes, point, style(run, point.method).marker, colour, pale=pale)

@@ -82,9 +82,9 @@ def residuals(steps: np.ndarray) -> np.ndarray:
     Small differences of either sign are small numbers: 0, -1, 1, -2, ... as 0, 1, 2, 3, ...
     """
     moved = np.diff(steps, axis=0, prepend=np.zeros_like(steps[:1]))
-    residual = moved.copy()
-    residual[2:] = moved[2:] - moved[1:-1]
-    signed = residual.view(np.int16)
+    delta = moved.copy()
+    delta[2:] = moved[2:] - moved[1:-1]
+    signed = delta.view(np.int16)
     return ((signed << 1) ^ (signed >> 15)).view(np.uint16)
 
 

@@ -225,9 +225,9 @@ def judged(run: Run) -> list[Judged]:
         for claim, comparison in zip(claims, compared)
     ]
     tested = [claim for claim in PRIMARY if claim.tested]
-    tested_at = [k for k, claim in enumerate(claims) if claim in tested and p_values[k] is not None]
-    corrected = holm([p for k in tested_at if (p := p_values[k]) is not None], family=len(tested))
-    for place, p in zip(tested_at, corrected):
+    tests = [k for k, claim in enumerate(claims) if claim in tested and p_values[k] is not None]
+    corrected = holm([p for k in tests if (p := p_values[k]) is not None], family=len(tested))
+    for place, p in zip(tests, corrected):
         p_values[place] = p
     lines = []
     for claim, comparison, p in zip(claims, compared, p_values):

@@ -99,9 +99,9 @@ def with_relative_excess(
 
 def _values(rows: pd.DataFrame, metric: str, methods: Sequence[str]) -> dict[str, dict[str, float]]:
     """Return scene -> method -> mean over seeds of the metric."""
-    metric_rows = rows[(rows["metric"] == metric) & rows["usable"] & rows["method"].isin(methods)]
+    cells = rows[(rows["metric"] == metric) & rows["usable"] & rows["method"].isin(methods)]
     values: dict[str, dict[str, float]] = {}
-    for (scene, method), value in metric_rows.groupby(["scene", "method"])["value"].mean().items():
+    for (scene, method), value in cells.groupby(["scene", "method"])["value"].mean().items():
         values.setdefault(scene, {})[method] = float(value)
     return values
 

@@ -9,7 +9,7 @@ from reports.statistics.means_and_spreads import mean_of
 from reports.statistics.outcomes import EXTERNAL, leads
 from reports.statistics.pareto import compared_scenes, rivals, run_time
 from reports.statistics.relative_excess import SKINNING, excess_of, own_excess_of, with_relative_excess
-from reports.tables.table import Cell, Column, Table, in_scenes, metric_column, table
+from reports.tables.table import METHOD, Cell, Column, Table, in_scenes, metric_column, table
 
 ROWS = 8
 ANSWERS = ("penetration/surface", "dynamics/correlation", "dynamics/amplitude")
@@ -42,9 +42,9 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     best = rivals(run, cells, scenes) if scenes else []
     solvers = [m for m in best if m not in listed]
     listed = run.ordered(methods or [*listed[: ROWS - len(solvers)], *solvers])
-    requests = [(name, rows_of_garment) for name in ANSWERS] + [(GAP, timed), (run_time(timed), timed)]
-    requests += [("cost/train", rows_of_garment)]
-    metric_rows = [(run.metrics[name], rows) for name, rows in requests if name in run.metrics]
+    queries = [(name, rows_of_garment) for name in ANSWERS] + [(GAP, timed), (run_time(timed), timed)]
+    queries += [("cost/train", rows_of_garment)]
+    sources = [(run.metrics[name], rows) for name, rows in queries if name in run.metrics]
     with_excess = with_relative_excess(run, rows_of_garment)
     excess = {name: excess_of(run, with_excess, name) for name in listed if name != run.reference}
     own_excess = {m: own_excess_of(run, rows_of_garment, m) for m in excess if m != SKINNING}
@@ -55,20 +55,15 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     lines: list[tuple[Cell, ...]] = [
         (
             method, *shares.get(method, (None, None)),
-            *(mean_of(rows, method, metric.name) for metric, rows in metric_rows),
+            *(mean_of(rows, method, metric.name) for metric, rows in sources),
         )
         for method in listed
     ]  # fmt: skip
     columns = [
-        Column("own_excess", "Excess in own energies", "%", digits=2),
+        METHOD, Column("own_excess", "Excess in own energies", "%", digits=2),
         Column("relative_excess", "Relative excess", "%", digits=2),
-        *(metric_column(metric) for metric, _ in metric_rows),
+        *(metric_column(metric) for metric, _ in sources),
     ]  # fmt: skip
-    places = [k for k in range(1, len(columns) + 1) if any(line[k] is not None for line in lines)]
-    lines = [(line[0], *(line[k] for k in places)) for line in lines]
-    columns = [columns[k - 1] for k in places]
-    if not columns:
-        return []
     of_motions = (
         f"{garment}: excess as a geometric mean over independent sources, the rest as arithmetic means over "
         "motions. In own energies: over the minimum of what the network was trained on (a dash: of vertices, "
@@ -76,5 +71,5 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     )
     caption = of_motions if garment else f"Means {in_scenes(scenes)}"
     caption += f"; run times (and energy gaps) {in_scenes(scenes)}." if garment and scenes else "."
-    method = Column("method", "Method", text=True, method=True)
-    return table("overview", (method, *columns), lines, caption)
+    tables = [made.filled() for made in table("overview", columns, lines, caption)]
+    return [made for made in tables if made.columns != (METHOD,)]

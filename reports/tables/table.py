@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -97,8 +97,8 @@ def scene_in_words(scene: str) -> str:
     garment, _, motion = scene.rpartition("/")
     name, _, part = motion.partition("@")
     clip = CLIPS.get(clip_of(name))
-    words = (clip.content, name) if clip else (name.replace("_", " "),)
-    return f"{garment}: " * bool(garment) + ", ".join(filter(None, (*words, part)))
+    motions = (clip.content, name) if clip else (name.replace("_", " "),)
+    return f"{garment}: " * bool(garment) + ", ".join(filter(None, (*motions, part)))
 
 
 def listed(items: Sequence[str]) -> str:
@@ -158,6 +158,12 @@ class Table:
     caption: str = ""
     grouped_by: tuple[str, ...] = ()
     note: str = ""
+
+    def filled(self) -> Table:
+        """Return the table without the columns in which no row has a cell."""
+        places = [k for k, cells in enumerate(zip(*self.rows)) if any(c is not None for c in cells)]
+        rows = tuple(tuple(row[k] for k in places) for row in self.rows)
+        return replace(self, columns=tuple(self.columns[k] for k in places), rows=rows)
 
     def write_csv(self, folder: Path) -> Path:
         """Write <folder>/<name>.csv whole or not at all; return its path.

@@ -63,15 +63,14 @@ def paper_table(run: Run) -> Table:
         Column("own_excess", "Own excess", "%"), Column("relative_excess", "Relative excess", "%"),
         *map(metric_column, metrics),
     ]  # fmt: skip
-    places = [k for k, cells in enumerate(zip(*lines)) if any(cell is not None for cell in cells)]
     caption = (
         f"{run.first_garment or 'All scenes'}: means over independent sources of motion and over seeds, of "
         "excess geometric; below: 95 % intervals, of times the range. Excess: energy above a reference "
         "solver's as a share of skinning's, in each method's own energies and in common ones. "
         f"Protocol {run.protocol or 'own'}; cite: {CITATION}, at {run.config.get('commit') or 'no commit'}."
     )
-    cells_of_lines = tuple(tuple(line[k] for k in places) for line in lines)
-    return Table(NAME, tuple(replace(columns[k], digits=2) for k in places), cells_of_lines, caption)
+    rounded = tuple(replace(column, digits=2) for column in columns)
+    return Table(NAME, rounded, tuple(lines), caption).filled()
 
 
 def _mean(rows: pd.DataFrame, method: str, metric: Metric) -> Effect | None:

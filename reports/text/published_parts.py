@@ -149,13 +149,14 @@ def front_sentences(run: Run) -> str:
         for of, metric in ((worn, ALIKE), (worn, SWING), (timed, WHOLE))
     )
     supervised, pbns, stopped = (f"{number(excesses[name].typical, 2)} %" for name in names[1:])
+    interval = " to ".join(number(end, 2) for end in excesses[SOLVER].effect.interval or ())
     worst, most = excesses[NETWORK].worst
     lines = (
         f"**{verdict(run, worn)}**\n",
         f"- Good at: energy for its time. Supervised has {supervised} "
         f"(against SNUG p {number(p_values[UNSEEN], 2)}, corrected), "
         f"PBNS {pbns}; "
-        f"{run.label(SOLVER)}, has {stopped} (inconclusive) and takes "
+        f"{run.label(SOLVER)}, has {stopped} ({interval or DASH}) and takes "
         f"{number(times[SOLVER] / times[NETWORK], 1)} times as long as SNUG.",
         "- Bad at: dynamics and unfamiliar motion. Its hem's correlation with the simulation's "
         f"is {number(alike[NETWORK], 2)} "
@@ -180,13 +181,13 @@ def run_rows(folders: Sequence[Path]) -> Rows:
     return [("Run", "Day", "Commit", "Test-set evaluations"), *dict.fromkeys(parts)]
 
 
-def _overview(folders: Sequence[Path], wanted: Sequence[str], methods: Sequence[str]) -> Rows:
+def _overview(folders: Sequence[Path], columns: Sequence[str], methods: Sequence[str]) -> Rows:
     """Return the table of page one with these methods, each from the first run that has it."""
     heads: list[str] = []
     rows: dict[str, list[str]] = {}
     for run in map(read_published, folders):
         missing = [name for name in methods if name in run.methods and name not in rows]
-        heads, *lines = text_rows(run, overview(run, missing)[0], wanted)
+        heads, *lines = text_rows(run, overview(run, missing)[0], columns)
         rows |= dict(zip(run.ordered(missing), lines))
     return [heads, *(rows[name] for name in methods)]
 

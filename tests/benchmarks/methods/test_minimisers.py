@@ -11,12 +11,7 @@ from benchmarks.methods.warm_started import SHARE, given_frames
 from benchmarks.metrics.energy import first_guess
 from benchmarks.scenes.sheets import exact_fall
 from reference_sim import Cloth, Material, Potential, simulate
-from reference_sim.energies import (
-    Gravity,
-    Inertia,
-    Step,
-    StretchStVK,
-)
+from reference_sim.energies import Gravity, Inertia, Step, StretchStVK
 from reference_sim.energies.bend_hinge_kernels import fold
 from reference_sim.energies.contact_penalty import sample_depth
 from reference_sim.energies.stretch_stvk import strain
