@@ -87,7 +87,7 @@ def _energies(run: Run, means: pd.Series, name: str, pbns: str, snug: str) -> li
 
 
 def _curvature(run: Run, means: pd.Series, name: str, base: str) -> list[Table]:
-    """Tabulate curvature with the full loss and without each term; nothing of a run without such a loss.
+    """Tabulate curvature by the full loss and without each term; none where the full one ran alone.
 
     Below stand the other members of the reference's family, whose errors are a floor.
     """

@@ -48,7 +48,7 @@ from reports.text.text_table import markdown_table, remarks_on, text_rows
 TIMED = ("quick",)  # runs with nothing beside them, which judge claims on times
 TIMES = ("s", "ms")  # units
 FAMILIES = {"primary": PRIMARY, "exploratory": EXPLORATORY}
-SOLVER = "fast-lbfgs-10"  # stopped early, beside SNUG on the front page
+SOLVER = "fast-lbfgs-10"  # stopped early, on the front page
 SWING, ALIKE = "dynamics/amplitude", "dynamics/correlation"
 Rows = Sequence[Sequence[str]]
 
@@ -133,7 +133,7 @@ def front_sentences(run: Run) -> str:
     """Return the verdict on SNUG and two bullets, as Markdown.
 
     Args:
-        run: has SNUG, PBNS, the supervised network and a solver stopped early in whole motions.
+        run: has SNUG, PBNS, Supervised and SOLVER in whole motions.
 
     Raises:
         KeyError: the method or claim of which a number is missing.
