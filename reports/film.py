@@ -28,7 +28,7 @@ up, for Blender's Mesh Cache modifier.
 The camera goes along with the garment; a roll-out that ended early keeps its last frame and says so.
 exit status: 0 written; 2 the run has no such roll-out: one line says why."""
 SHADES = 40  # of either colour: three seconds of four views are below 3 MB
-MOST_RATE = 50.0  # frames a second of a GIF that browsers show in their time
+MOST_RATE = 16.0  # frames a second of a GIF: half of those of 30, and half of its bytes
 
 
 def select_roll_outs(
@@ -62,10 +62,8 @@ def select_roll_outs(
 def write_frames(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:
     """Write a PNG of one frame, or a GIF whose hundredths of a second add up to the right time.
 
-    Colours are shades of those of cloth and body.
-
-    Browsers show a frame for two hundredths or more: of a higher rate every second or third frame is
-    kept.
+    Colours are shades of those of cloth and body. Of a rate above `MOST_RATE` every second, third or
+    later frame is kept.
     """
     from PIL import Image
 
