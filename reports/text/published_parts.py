@@ -45,7 +45,7 @@ from reports.tables.table import DASH, Table, number
 from reports.text.published_times import time_rows
 from reports.text.text_table import markdown_table, remarks_on, text_rows
 
-TIMED = ("quick",)  # runs with nothing beside them, which judge claims on times
+TIMED = ("quick", "other_networks")  # runs with nothing beside them, which judge claims on times
 TIMES = ("s", "ms")  # units
 FAMILIES = {"primary": PRIMARY, "exploratory": EXPLORATORY}
 SOLVER = "fast-lbfgs-10"  # stopped early, on the front page
@@ -168,17 +168,13 @@ def front_sentences(run: Run) -> str:
 
 
 def run_rows(folders: Sequence[Path]) -> Rows:
-    """Return a heading and a row of each run, of each part of a merged one.
-
-    It has day, commit, and how often the run evaluated test motions.
-    """
+    """Return a heading and a row of each run: day, commit, how often it evaluated test motions."""
     configs = {folder.name: RunFolder(folder).read_config() for folder in folders}
-    parts = [
-        (name, str(part.get("finished", ""))[:10], part["commit"], str(len(config["test_looks"])))
+    rows = [
+        (name, config["finished"][:10], config["commit"], str(len(config["test_looks"])))
         for name, config in configs.items()
-        for part in config.get("merged", [config])
     ]
-    return [("Run", "Day", "Commit", "Test-set evaluations"), *dict.fromkeys(parts)]
+    return [("Run", "Day", "Commit", "Test-set evaluations"), *rows]
 
 
 def _overview(folders: Sequence[Path], columns: Sequence[str], methods: Sequence[str]) -> Rows:
