@@ -197,11 +197,9 @@ def budgeted(engine: Engine, factor: int, what: str) -> Answer:
 @measured
 def converged_budget(engine: Engine) -> Answer:
     """Return the least multiple of the default budget that is within CONVERGED of the engine's limit."""
-    runs, remark = ladder(engine.name)
-    factor = _within(runs)
-    if factor is not None:
-        return factor, remark
-    return None, "; ".join(filter(None, (f"no budget is within {CONVERGED:g} %", remark)))
+    runs, limit_not_reached = ladder(engine.name)
+    factor = None if limit_not_reached else _within(runs)
+    return factor, limit_not_reached or ("" if factor else f"no budget is within {CONVERGED:g} %")
 
 
 @measured

@@ -175,13 +175,15 @@ def test_the_least_budget_is_one_from_which_all_are_near():
 def test_a_budget_that_is_not_near_says_how_far_the_last_two_are_apart_and_what_was_counted(monkeypatch):
     run = roll_out(fake(), specimen("falling"))
     far = dataclasses.replace(run, positions=run.positions + 0.5 * (run.positions - run.positions[:1]))
-    monkeypatch.setattr(audit, "ladder", lambda name: ({1: far, 4: run}, "its last two budgets differ"))
     monkeypatch.setattr(audit, "reference_ladder", lambda substeps: {1: run, 4: far, 16: run})
-    engine = ENGINES["mujoco.euler"]
-    assert audit.converged_budget.__wrapped__(engine) == (
-        None,
-        "no budget is within 1 %; its last two budgets differ",
-    )
+    engine, differ, none = ENGINES["mujoco.euler"], "its last two budgets differ", "no budget is within 1 %"
+    for budgets, remark, expected in (
+        ({1: far, 4: run}, "", (None, none)),
+        ({1: far, 4: run, 16: run}, "", (4, "")),
+        ({1: far, 4: run, 16: run}, differ, (None, differ)),  # near the largest, which is not its limit
+    ):
+        monkeypatch.setattr(audit, "ladder", lambda name, found=(budgets, remark): found)
+        assert audit.converged_budget.__wrapped__(engine) == expected
     for iterates, unit in ((True, "iterations a step"), (False, "steps a frame")):
         engine = dataclasses.replace(engine, iterates=iterates)
         assert audit.reference_milliseconds.__wrapped__(engine) == (
