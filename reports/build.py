@@ -61,9 +61,6 @@ def build_report(run_dir: str | Path) -> Built:
     tables = make_tables(run)
     write_tables(folder.tables, tables.values())
     write_paper_table(folder, run)
-    if folder.trajectories.is_dir():  # else pictures of roll-outs that are gone stay
-        for path in [path for figure in FIGURES for path in figure.files_in(folder.figures)]:
-            path.unlink()
     with ProcessPoolExecutor(1) as beside:  # the page takes as long as figures and PDF
         page = beside.submit(_write_page, folder, Report(run, tables, {}))
         pdf = write_pdf(folder, Report(run, tables, draw_figures(run, folder.figures, FIGURES)))

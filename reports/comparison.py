@@ -52,7 +52,7 @@ def _shared(frames: Sequence[pd.DataFrame], *columns: str) -> list[pd.DataFrame]
 
 
 def gone(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
-    """Return a line for each method, and each metric of one, that the later run lacks somewhere."""
+    """Return a line for each method or metric that the later run lacks somewhere."""
     keys = [frame.set_index(CELL).index for frame in (one, other)]
     missing = one[~keys[0].isin(keys[1])].astype({"method": str, "metric": str})
     lacking = missing.set_index(CELL[:3]).index.isin(other.set_index(CELL[:3]).index)
@@ -221,7 +221,7 @@ def _of_one_seed(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:
 
 
 def _without_more_noise(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:
-    """Return both; no answer of the later run is less certain than in the earlier: it would hide changes."""
+    """Return both; no later answer is less certain than the earlier, which would hide changes."""
     least = one.set_index(CELL)["uncertainty"].reindex(other.set_index(CELL).index).fillna(0.0).to_numpy()
     timed = other["unit"].isin(("s", "ms"))
     now = other["uncertainty"]
@@ -229,7 +229,7 @@ def _without_more_noise(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataF
 
 
 def _demand_same_scenes(one: Run, other: Run) -> None:
-    """Raise ResultsError where the runs differ in what makes their scenes, of entries that both have."""
+    """Raise ResultsError where an entry of both that makes their scenes differs."""
     before, after = (_entries_of_scenes(run) for run in (one, other))
     for name in before:
         if name in after and before[name] != after[name]:
@@ -328,7 +328,7 @@ def _with_known_zero(run: Run, *frames: pd.DataFrame, basis: pd.DataFrame) -> li
 
 
 def _metrics(run: Run) -> dict[str, Metric]:
-    """Return the metrics of the run by name, with that of each energy's relative excess among them."""
+    """Return the metrics of the run by name, those of relative excess among them."""
     relative = (relative_metric(metric.name) for metric in run.metrics.values() if metric.arbitrary_zero)
     return {**{metric.name: metric for metric in relative}, **run.metrics}
 

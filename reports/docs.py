@@ -1,4 +1,4 @@
-"""python -m reports.docs: make the generated parts of README and docs from published runs and the code."""
+"""python -m reports.docs: make the generated parts of README and docs anew."""
 
 from __future__ import annotations
 

@@ -63,7 +63,7 @@ class Scored:
     folder: Path | None = None
 
     def proof(self) -> str:
-        """Return what its numbers rest on: its program was run here, or its files measured, or neither."""
+        """Return what its numbers rest on: a program, files, or a declaration."""
         files = self.run.config.get("entry") or {}
         if self.folder is None or RunFolder(self.folder).changed(files) or not files:
             return VERIFIED if self.folder is None else UNVERIFIED

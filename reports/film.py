@@ -28,7 +28,7 @@ up, for Blender's Mesh Cache modifier.
 The camera goes along with the garment; a roll-out that ended early keeps its last frame and says so.
 exit status: 0 written; 2 the run has no such roll-out: one line says why."""
 SHADES = 40  # of either colour: three seconds of four views are below 3 MB
-MOST_RATE = 16.0  # frames a second of a GIF: half of those of 30, and half of its bytes
+MOST_RATE = 16.0  # frames a second of a GIF
 
 
 def select_roll_outs(

@@ -1,7 +1,4 @@
-"""The PDF: its content as values that the template lays out, report blocks and what stands around them.
-
-It is to be read in minutes: what is long stands in tables/ and in report.html, as the protocol says.
-"""
+"""The PDF: its content as values that the template lays out, report blocks and what stands around them."""
 
 from __future__ import annotations
 

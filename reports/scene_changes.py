@@ -24,7 +24,7 @@ GONE, WORSE, BETTER, OTHER = "gone", "worse", "better", "changed"  # verdicts, t
 FAILING = (GONE, WORSE)
 ENERGY_TOLERANCE = 0.02  # share of an energy
 TOLERANCE = 0.05  # share of any other answer
-TIME_TOLERANCE = 0.2  # share of a time or memory that was repeated; of times that scatter by 5 % some differ by 15
+TIME_TOLERANCE = 0.2  # share of a time or memory that was repeated
 # share of the median method's value; a smaller difference is none, whatever it is a share of
 FLOOR = 1e-4
 SPREADS = 3.0  # times the reference's noise, beyond which an answer that nothing repeats has changed

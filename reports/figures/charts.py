@@ -64,7 +64,7 @@ class Curve:
 
 
 def curves_of(run: Run, points: Iterable[Point]) -> list[Curve]:
-    """Return a curve for each family of networks and baselines, and one for solvers stopped early.
+    """Return a curve for each family, and one for solvers stopped early.
 
     A curve of solvers joins the best at each run time; the others lie aside. So do those that start from
     one and the same method. Variants of the reference are left out.
@@ -214,7 +214,7 @@ MOST_ROWS, ROW = 15, 0.19  # methods, and inches of each
 
 
 def excess_by_motion(run: Run) -> Drawing | None:
-    """Draw a row for each method of each garment, a dot for each motion: relative excess, mean over seeds."""
+    """Draw relative excess: a row for each method of each garment, a dot for each motion."""
     rows = with_relative_excess(run, run.garment_rows)
     rows = rows[(rows["metric"] == RELATIVE_EXCESS.name) & rows["usable"]]
     rows = rows[~rows["method"].isin([*run.with_role("reference", OF_REFERENCE), SKINNING])]

@@ -263,49 +263,30 @@ class Figure:
     name: str
     draw: Callable[[Run], Drawing | None]
 
-    def files_in(self, folder: Path) -> list[Path]:
-        """Return its files in the folder of figures."""
-        return sorted(path for path in folder.glob(f"{self.name}*") if path.suffix in (".png", ".svg"))
-
 
 def draw_figures(run: Run, folder: Path, figures: Iterable[Figure]) -> Mapping[str, Picture]:
-    """Draw into the folder all that the run has the data for; return name of the figure -> its picture.
-
-    What cannot be drawn is taken from the folder if it lies there.
-    """
+    """Draw all that the run has data for, in place of older files; return name -> picture."""
     pictures = {}
     for figure in figures:
+        for path in [*folder.glob(f"{figure.name}*.png"), *folder.glob(f"{figure.name}*.svg")]:
+            path.unlink()
         if drawing := figure.draw(run):
             pictures[figure.name] = save_drawing(folder, drawing)
-        elif kept := [path for path in figure.files_in(folder) if path.suffix == ".png"]:
-            pictures[figure.name] = kept_picture(kept[0])
     return pictures
 
 
 def save_drawing(folder: Path, drawing: Drawing) -> Picture:
-    """Write <name>.png, which holds its caption, and, unless it is a photograph, <name>.svg for the PDF."""
-    from PIL import Image, PngImagePlugin
+    """Write <name>.png and, unless it is a photograph, <name>.svg, which the PDF takes."""
+    from PIL import Image
 
     canvas, path = drawing.canvas, folder / f"{drawing.name}.png"
-    description = PngImagePlugin.PngInfo()
-    description.add_text("Description", drawing.caption)
     with replacing(path) as temporary:
         canvas.savefig(temporary, dpi=DOTS)
         with Image.open(temporary) as image:  # 256 colours: a third of the bytes, none moves by 5 %
             reduced = image.convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE)
-        reduced.save(temporary, "PNG", optimize=True, pnginfo=description, dpi=(DOTS, DOTS))
+        reduced.save(temporary, "PNG", optimize=True, dpi=(DOTS, DOTS))
     if drawing.vector:
         canvas.set_layout_engine("none")  # it has done its work, which is half of the time of a figure
-        with replacing(path.with_suffix(".svg")) as temporary:
+        with replacing(path := path.with_suffix(".svg")) as temporary:
             canvas.savefig(temporary, metadata={"Date": None})
-    return kept_picture(path)
-
-
-def kept_picture(path: Path) -> Picture:
-    """Return the picture that `save_drawing` wrote as this PNG, as vector graphic where it has one."""
-    from PIL import Image
-
-    with Image.open(path) as image:
-        caption, width = image.info.get("Description", ""), image.width / DOTS / PAGE_WIDTH
-    vector = path.with_suffix(".svg")
-    return Picture(vector if vector.is_file() else path, caption, min(1.0, width))
+    return Picture(path, drawing.caption, min(1.0, canvas.get_figwidth() / PAGE_WIDTH))

@@ -45,7 +45,7 @@ from reports.tables.table import DASH, Table, number
 from reports.text.published_times import time_rows
 from reports.text.text_table import markdown_table, remarks_on, text_rows
 
-TIMED = ("quick", "other_networks")  # runs with nothing beside them, which judge claims on times
+TIMED = ("quick", "other_networks")  # judge claims on times
 TIMES = ("s", "ms")  # units
 FAMILIES = {"primary": PRIMARY, "exploratory": EXPLORATORY}
 SOLVER = "fast-lbfgs-10"  # stopped early, on the front page
@@ -89,11 +89,7 @@ def _words(text: str) -> list[str]:
 
 @cache
 def _judged(*folders: Path) -> tuple[dict[Claim, tuple[str, Judged]], dict[str, str]]:
-    """Return claim -> first run that has both of its methods and its judgement; labels of methods.
-
-    A run that shared its machine with other work judges no claim on times: its methods may have had
-    different shares of the processors.
-    """
+    """Return claim -> first run that has both of its methods and its judgement; labels of methods."""
     verdicts: dict[Claim, tuple[str, Judged]] = {}
     labels: dict[str, str] = {}
     for folder in folders:

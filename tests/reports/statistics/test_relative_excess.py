@@ -71,3 +71,15 @@ def test_a_method_with_less_energy_than_a_finer_simulation_is_below_zero_against
     assert shown == {
         "snug": pytest.approx([100 * 0.2 / 1.4, -20.0]), "pbns": pytest.approx([100 * 0.6 / 1.4, 20.0])
     }  # fmt: skip
+
+
+def test_a_garment_that_fell_off_has_no_excess():
+    """Its weight lies lower than that of any garment that is worn."""
+    worn = of("simulation", 1.0), of("skinning", 2.0), distance("skinning", 50.0)
+    made = shares(*worn, of("snug", 0.9), distance("snug", 240.0))
+    assert made.loc["snug", "value"] == pytest.approx(-10.0)
+    assert "snug" not in shares(*worn, of("snug", -1.0), distance("snug", 260.0)).index
+
+
+def distance(method, value):
+    return row("tshirt/kick", method, "distance/rms", value, unit="mm")
