@@ -95,7 +95,7 @@ MOST_METHODS, MOST_CHANGES = 16, 8  # lines without --metrics or --methods
 
 
 def _headline(comparison: Comparison, run: Run) -> Iterator[str]:
-    """Yield the table of the chief metrics of each method, the first of them."""
+    """Yield the table of the chief metrics of each method."""
     if not comparison.headline:
         return
     metrics = {RELATIVE_EXCESS.name: RELATIVE_EXCESS, **run.metrics}

@@ -88,7 +88,7 @@ def _times_faster(run: Run, name: str) -> int:
 
 
 def likeness(correlation: float) -> str:
-    """Return in words how dynamics follow others with which they have that correlation."""
+    """Return in words how dynamics of that correlation follow others."""
     if correlation < 0.3:
         return "hardly follow"
     return "partly follow" if correlation < 0.8 else "follow"
