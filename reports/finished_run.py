@@ -9,7 +9,6 @@ from pathlib import Path
 from textwrap import shorten
 from typing import Any
 
-import numpy as np
 import pandas as pd
 
 from benchmarks.metric import Metric
@@ -225,26 +224,11 @@ def make_run(config: Mapping[str, Any], rows: Sequence[Row], changed: Sequence[s
         *(name for name in units if name not in declared),
     ]
     metrics = {name: _metric(name, units[name], declared.get(name) or {}) for name in names}
-    falling = frame["metric"].isin([metric.name for metric in metrics.values() if metric.arbitrary_zero])
-    frame.loc[falling & _fell_off(frame), ["usable", "status", "reason"]] = False, "fell off", FELL_OFF
     frame["table"] = frame["metric"].map({name: metric.table for name, metric in metrics.items()})
     frame["case"] = _cases(frame, config.get("cases") or {})
     frame = frame.astype({name: pd.CategoricalDtype(sorted(set(frame[name]))) for name in COMPARED})
     methods = _methods(frame, config.get("methods") or {})
     return Run(config, frame, metrics, methods, changed)
-
-
-OFF_BODY = 5.0  # times as far from the simulation as skinning alone
-FELL_OFF = f"over {OFF_BODY:g} times as far from the simulation as skinning alone"
-
-
-def _fell_off(frame: pd.DataFrame) -> np.ndarray:
-    """Return (N,) whether each row's garment is no longer worn: its weight falls with it."""
-    cell = ["scene", "method", "seed"]
-    distances = frame[(frame["metric"] == "distance/rms") & frame["usable"]]
-    greatest = OFF_BODY * distances[distances["method"] == "skinning"].groupby("scene")["value"].max()
-    far = distances[distances["value"] > distances["scene"].map(greatest)]
-    return frame.set_index(cell).index.isin(far.set_index(cell).index)
 
 
 def _metric(name: str, unit: str, declared: Mapping[str, Any]) -> Metric:

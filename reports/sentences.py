@@ -30,7 +30,27 @@ def headline(run: Run) -> list[tuple[str, str]]:
 @lru_cache(maxsize=4)
 def _measured(run: Run) -> dict[str, str]:
     worn = run.garment_rows[run.garment_rows["garment"] == run.first_garment]
-    return {"Verdict": verdict(run, worn), TRAINED: _trained(run, worn), "How certain": _certainty(run)}
+    return {
+        "Verdict": verdict(run, worn),
+        FELL: _fallen(run, worn),
+        TRAINED: _trained(run, worn),
+        "How certain": _certainty(run),
+    }
+
+
+FELL = "What fell off the body"
+
+
+def _fallen(run: Run, worn: pd.DataFrame) -> str:
+    """Name the methods with roll-outs that have less energy than any garment that is worn."""
+    rows = with_relative_excess(run, worn)
+    rows = rows[rows["metric"] == RELATIVE_EXCESS.name]
+    names = [
+        f"{run.label(name)} ({len(kept) - kept.sum()} of {len(kept)} roll-outs)"
+        for name, kept in rows.groupby("method", observed=True)["usable"]
+        if not kept.all()
+    ]
+    return f"{', '.join(names)}." if names else ""
 
 
 TRAINED = "How far trained"

@@ -289,6 +289,8 @@ def verdict_of_failed(claim: Claim, compared: Comparison, frame: pd.DataFrame) -
     if finished is None:
         finished, name, which = compared.other, claim.lower, "first"
     failed = frame[(frame["method"] == name) & (frame["status"] != "skipped")]
+    if finished and compared.metric.arbitrary_zero and (failed["metric"] == compared.metric.name).any():
+        return OPEN, f": the {which} fell off"
     answer = compared.metric.lower_is_better and compared.metric.of == "answer"
     if not answer or finished is None or failed.empty or failed["usable"].any():
         return "", ""

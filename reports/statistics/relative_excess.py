@@ -5,7 +5,8 @@ Of the total energy E of one motion and seed it is
     100 (E(method) - E(reference)) / (E(skinning) - E(reference)),
 
 0 for the reference, 100 for the garment that only follows the skin, and below 0 for less energy than the
-reference has. Any other energy whose zero is a choice, as gravity, is divided by the same excess.
+reference has. Any other energy whose zero is a choice, as gravity, is divided by the same excess. A garment
+that falls loses ever more energy: below -100 it has fallen off, and its roll-out counts as failed.
 """
 
 from __future__ import annotations
@@ -31,6 +32,7 @@ from reports.statistics.effects import (
 from reports.statistics.means_and_spreads import Mean, pair
 
 TOTAL = "energy/total"
+LEAST = -100.0  # [%] of a garment that is worn
 OWN_EXCESS = "own_excess/total"
 SKINNING = "skinning"  # the method that has 100 %
 RELATIVE_EXCESS = Metric(
@@ -61,8 +63,8 @@ def with_relative_excess(
 ) -> pd.DataFrame:
     """Return the rows, and a row of the relative excess of each usable row of the metric.
 
-    Scenes without the reference or skinning have none, nor those in which skinning has no excess. Rows
-    that have relative excesses of the metric already come back as they are.
+    Scenes without the reference or skinning have none, nor those in which skinning has no excess; below
+    LEAST it is not usable. Rows that have relative excesses of the metric already come back as they are.
 
     Args:
         run: declares the reference and its family, of which members that stalled are left out.
@@ -93,6 +95,7 @@ def with_relative_excess(
     excesses = lines.loc[[place for place, *_ in parts]].assign(
         metric=relative_metric(metric).name, unit="%", value=[value for _, value, *_ in parts],
         uncertainty=[uncertainty for *_, uncertainty, _ in parts], moved=[moved for *_, moved in parts],
+        usable=[value >= LEAST for _, value, *_ in parts],
     )  # fmt: skip
     return pd.concat([rows, excesses[rows.columns]], ignore_index=True)
 
@@ -176,7 +179,8 @@ def own_excess_of(run: Run, rows: pd.DataFrame, method: str) -> Effect | None:
 
     Its `shown` is the typical value [%] over the scenes of these rows.
     """
-    one, zero = pair(rows, method, run.reference, OWN_EXCESS)
+    fallen = (rows["metric"] == OWN_EXCESS) & (rows["value"] < LEAST)
+    one, zero = pair(rows.assign(usable=rows["usable"] & ~fallen), method, run.reference, OWN_EXCESS)
     return effect(one, zero, EXCESS) if one and zero else None
 
 

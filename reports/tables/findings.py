@@ -9,12 +9,13 @@ import pandas as pd
 
 from benchmarks.metric import Metric
 from benchmarks.results.protocol import STARTS
-from reports.finished_run import FELL_OFF, Run
+from reports.finished_run import Run
 from reports.statistics.effects import EXCESS, off_scale
 from reports.statistics.means_and_spreads import AT_REFERENCE, in_spreads
 from reports.statistics.outcomes import check_name, checks, stress_tests, tolerances_away
 from reports.statistics.paper_claims import judged
 from reports.statistics.relative_excess import (
+    LEAST,
     SKINNING,
     Excess,
     excess_of,
@@ -67,8 +68,8 @@ def findings(run: Run) -> list[Table]:
 
 EXCESS_NOTE = (
     "Typical: mean over motions and seeds of arcsinh(x / 1 %), taken back: a geometric mean well above 1 %, "
-    "arithmetic well below. Segments of a recording count as one motion. A garment "
-    f"{FELL_OFF} fell off and has none. {VERDICTS}"
+    "arithmetic well below. Segments of a recording count as one motion. A garment below "
+    f"{LEAST:g} % has fallen off and counts as failed. {VERDICTS}"
 )
 
 

@@ -8,12 +8,7 @@ from benchmarks.metric import Metric
 from benchmarks.results.protocol import SECOND_STARTS
 from reports.finished_run import Run
 from reports.statistics.means_and_spreads import means
-from reports.statistics.relative_excess import (
-    SKINNING,
-    TOTAL,
-    excess_of,
-    relative_metric,
-)
+from reports.statistics.relative_excess import SKINNING, TOTAL, excess_of, relative_metric
 from reports.statistics.verdicts import compare_methods
 from reports.tables.table import GARMENT, METHOD, SCENE, SUITE, Cell, Column, Table, metric_column, table
 

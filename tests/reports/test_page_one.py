@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 
-from reports.sentences import TRAINED, headline
+from reports.sentences import FELL, TRAINED, headline
 from reports.statistics.outcomes import leads
 from tests.reports.report_folder import SCENES, all_rows, row, run_of
 from tests.reports.tables.test_tables import on_two_scenes
@@ -50,6 +50,12 @@ def test_a_network_is_compared_with_its_fully_trained_one():
     full = [dataclasses.replace(r, method="snug-packaged") for r in on_two_scenes("snug", 0.6, 7.1)]
     text = said(TRAINED, [*SNUG, *full, *PBNS, *BESIDE])
     assert text == "Relative excess as trained in this run: SNUG 10 %, fully trained 1.0 %."
+
+
+def test_a_network_whose_garment_fell_off_is_named():
+    rows = [*on_two_scenes("snug", -10.0, 9.0), *PBNS, *BESIDE]
+    assert said(FELL, rows) == "SNUG (1 of 2 roll-outs)." and said(FELL, [*SNUG, *BESIDE]) == ""
+    assert "(1 of 2 roll-outs)." in said("Verdict", rows)
 
 
 def test_page_one_shows_the_network_the_papers_rival_or_another_and_a_baseline():

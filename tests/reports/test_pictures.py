@@ -71,7 +71,7 @@ def filmed(run, path, *more) -> int:
     return film.main([*arguments, "-o", str(path), *more])
 
 
-def test_a_gif_has_every_frame_in_its_time_and_the_same_bytes_twice(run, tmp_path):
+def test_a_gif_of_few_frames_has_each_in_its_time_and_the_same_bytes_twice(run, tmp_path):
     paths = [tmp_path / "x.gif", tmp_path / "y.gif"]
     assert [filmed(run, path, "--speed", ".5") for path in paths] == [0, 0]
     assert paths[0].read_bytes() == paths[1].read_bytes()

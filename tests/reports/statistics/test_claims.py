@@ -93,6 +93,8 @@ def test_no_verdict_hangs_on_where_gravity_is_zero():
         near, far = verdicts(0.0, energy), verdicts(100.0, energy)
         assert near.verdict == far.verdict == verdict and near.compared.effect.scale == EXCESS
         assert near.compared.effect.value == pytest.approx(far.compared.effect.value)
+    fallen = verdicts(0.0, -2.0)
+    assert (fallen.verdict, fallen.remark) == ("inconclusive", ": the first fell off")
 
 
 def test_the_primary_family_is_the_same_whatever_a_run_has_and_others_are_not_corrected():
