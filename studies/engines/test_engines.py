@@ -176,7 +176,11 @@ def test_a_budget_that_is_not_near_says_how_far_the_last_two_are_apart_and_what_
     run = roll_out(fake(), specimen("falling"))
     far = dataclasses.replace(run, positions=run.positions + 0.5 * (run.positions - run.positions[:1]))
     monkeypatch.setattr(audit, "reference_ladder", lambda substeps: {1: run, 4: far, 16: run})
-    engine, differ, none = ENGINES["mujoco.euler"], "its last two budgets differ", "no budget is within 1 %"
+    engine, differ, none = (
+        ENGINES["mujoco.euler"],
+        "its last two budgets differ",
+        "no budget is within 1 %",
+    )
     for budgets, remark, expected in (
         ({1: far, 4: run}, "", (None, none)),
         ({1: far, 4: run, 16: run}, "", (4, "")),
