@@ -176,11 +176,8 @@ def test_a_budget_that_is_not_near_says_how_far_the_last_two_are_apart_and_what_
     run = roll_out(fake(), specimen("falling"))
     far = dataclasses.replace(run, positions=run.positions + 0.5 * (run.positions - run.positions[:1]))
     monkeypatch.setattr(audit, "reference_ladder", lambda substeps: {1: run, 4: far, 16: run})
-    engine, differ, none = (
-        ENGINES["mujoco.euler"],
-        "its last two budgets differ",
-        "no budget is within 1 %",
-    )
+    engine, differ = ENGINES["mujoco.euler"], "its last two budgets differ"
+    none = "no budget is within 1 %"
     for budgets, remark, expected in (
         ({1: far, 4: run}, "", (None, none)),
         ({1: far, 4: run, 16: run}, "", (4, "")),
@@ -190,10 +187,8 @@ def test_a_budget_that_is_not_near_says_how_far_the_last_two_are_apart_and_what_
         assert audit.converged_budget.__wrapped__(engine) == expected
     for iterates, unit in ((True, "iterations a step"), (False, "steps a frame")):
         engine = dataclasses.replace(engine, iterates=iterates)
-        assert audit.reference_milliseconds.__wrapped__(engine) == (
-            None,
-            f"the reference is not within 1 % at 4 {unit}",
-        )
+        reason = f"the reference is not within 1 % at 4 {unit}"
+        assert audit.reference_milliseconds.__wrapped__(engine) == (None, reason)
 
 
 def test_an_absent_engine_is_skipped_with_its_command(monkeypatch, plan):

@@ -75,11 +75,9 @@ def test_a_method_with_less_energy_than_a_finer_simulation_is_below_zero_against
 
 def test_a_garment_that_fell_off_has_no_excess():
     """Its weight lies lower than that of any garment that is worn."""
-    worn = of("simulation", 1.0), of("skinning", 2.0), of("pbns", 0.5)
-    made = shares(*worn, of("snug", -1.0))
+    rows = of("simulation", 1.0), of("skinning", 2.0), of("pbns", 0.5), of("snug", -1.0)
+    made = shares(*rows)
     assert made.loc["pbns", "value"] == pytest.approx(-50.0)
-    assert made["usable"].to_dict() == dict.fromkeys(("simulation", "skinning", "pbns"), True) | {
-        "snug": False
-    }
-    (table,) = relative_excess(run_of([*worn, of("snug", -1.0)]))
+    assert list(made.index[~made["usable"].astype(bool)]) == ["snug"]
+    (table,) = relative_excess(run_of(rows))
     assert [row[1] for row in table.rows] == ["pbns"]
