@@ -30,10 +30,11 @@ def headline(run: Run) -> list[tuple[str, str]]:
 @lru_cache(maxsize=4)
 def _measured(run: Run) -> dict[str, str]:
     worn = run.garment_rows[run.garment_rows["garment"] == run.first_garment]
+    rows = with_relative_excess(run, worn)
     return {
-        "Verdict": verdict(run, worn),
-        FELL: _fallen(run, worn),
-        TRAINED: _trained(run, worn),
+        "Verdict": verdict(run, rows),
+        FELL: _fallen(run, rows),
+        TRAINED: _trained(run, rows),
         "How certain": _certainty(run),
     }
 
@@ -41,9 +42,8 @@ def _measured(run: Run) -> dict[str, str]:
 FELL = "What fell off the body"
 
 
-def _fallen(run: Run, worn: pd.DataFrame) -> str:
+def _fallen(run: Run, rows: pd.DataFrame) -> str:
     """Name the methods with roll-outs that have less energy than any garment that is worn."""
-    rows = with_relative_excess(run, worn)
     rows = rows[rows["metric"] == RELATIVE_EXCESS.name]
     names = [
         f"{run.label(name)} ({len(kept) - kept.sum()} of {len(kept)} roll-outs)"
@@ -56,9 +56,9 @@ def _fallen(run: Run, worn: pd.DataFrame) -> str:
 TRAINED = "How far trained"
 
 
-def _trained(run: Run, worn: pd.DataFrame) -> str:
+def _trained(run: Run, rows: pd.DataFrame) -> str:
     """Say how far networks of the run are from the package's, which are fully trained."""
-    rows, texts = with_relative_excess(run, worn), []
+    texts = []
     for name in run.with_role("network"):
         here, full = (excess_of(run, rows, trained) for trained in (name, f"{name}-packaged"))
         if here and full and here.typical != full.typical:

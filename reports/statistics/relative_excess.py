@@ -179,8 +179,9 @@ def own_excess_of(run: Run, rows: pd.DataFrame, method: str) -> Effect | None:
 
     Its `shown` is the typical value [%] over the scenes of these rows.
     """
-    fallen = (rows["metric"] == OWN_EXCESS) & (rows["value"] < LEAST)
-    one, zero = pair(rows.assign(usable=rows["usable"] & ~fallen), method, run.reference, OWN_EXCESS)
+    rows = rows[(rows["metric"] == OWN_EXCESS) | ~rows["usable"]]
+    rows = rows.assign(usable=rows["usable"] & ~(rows["value"] < LEAST))
+    one, zero = pair(rows, method, run.reference, OWN_EXCESS)
     return effect(one, zero, EXCESS) if one and zero else None
 
 

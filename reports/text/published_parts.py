@@ -45,7 +45,7 @@ from reports.tables.table import DASH, Table, number
 from reports.text.published_times import time_rows
 from reports.text.text_table import markdown_table, remarks_on, text_rows
 
-TIMED = ("quick", "other_networks")  # judge claims on times
+TIMED = ("quick", "other_networks")  # judge claims on times: nothing ran beside them
 TIMES = ("s", "ms")  # units
 FAMILIES = {"primary": PRIMARY, "exploratory": EXPLORATORY}
 SOLVER = "fast-lbfgs-10"  # stopped early, on the front page
@@ -148,7 +148,7 @@ def front_sentences(run: Run) -> str:
     interval = " to ".join(number(end, 2) for end in excesses[SOLVER].effect.interval or ())
     worst, most = excesses[NETWORK].worst
     lines = (
-        f"**{verdict(run, worn)}**\n",
+        f"**{verdict(run, rows)}**\n",
         f"- Good at: energy for its time. Supervised has {supervised} "
         f"(against SNUG p {number(p_values[UNSEEN], 2)}, corrected), "
         f"PBNS {pbns}; "
