@@ -125,20 +125,24 @@ class Excess:
     Attributes:
         effect: against the reference, from which the verdict comes; its interval is that of `typical`.
         cells: (scene, seed) -> value.
-        pooled: excess energy, the mean over seeds, summed over motions, as a share of skinning's so
-            summed.
+        whole: scene -> skinning's excess energy over the reference [J], which is 100 %.
         fewer: remark on roll-outs that are missing, empty where none is.
     """
 
     effect: Effect
     cells: Mapping[tuple[str, int], float]
-    pooled: float
+    whole: Mapping[str, float]
     fewer: str = ""
 
     @property
     def by_motion(self) -> dict[str, float]:
         """Scene -> mean over seeds."""
         return pd.Series(dict(self.cells)).groupby(level=0, sort=False).mean().to_dict()
+
+    @property
+    def pooled(self) -> float:
+        """Excess energy, the mean over seeds, summed over motions, as a share of skinning's so summed."""
+        return sum(self.whole[k] * v for k, v in self.by_motion.items()) / sum(self.whole.values())
 
     @property
     def typical(self) -> float:
@@ -165,13 +169,9 @@ def excess_of(run: Run, rows: pd.DataFrame, method: str) -> Excess | None:
     one, zero = compared_excess(run, rows, method, run.reference)
     if one is None or zero is None:
         return None
-    motions = {scene for scene, _ in one.cells}
-    totals = _values(rows, TOTAL, [method, run.reference, SKINNING])
-    excess, skinning = (
-        sum(totals[scene][name] - totals[scene][run.reference] for scene in motions)
-        for name in (method, SKINNING)
-    )
-    return Excess(effect(one, zero, EXCESS), one.cells, 100.0 * excess / skinning, one.fewer)
+    totals = _values(rows, TOTAL, [run.reference, SKINNING])
+    whole = {motion: totals[motion][SKINNING] - totals[motion][run.reference] for motion, _ in one.cells}
+    return Excess(effect(one, zero, EXCESS), one.cells, whole, one.fewer)
 
 
 def own_excess_of(run: Run, rows: pd.DataFrame, method: str) -> Effect | None:

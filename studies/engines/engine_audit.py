@@ -186,12 +186,12 @@ def law(engine: Engine, name: str, sample: str) -> Answer:
 @measured
 def budgeted(engine: Engine, factor: int, what: str) -> Answer:
     """Return a budget's distance from the engine's own limit [%], or the time of a frame [ms]."""
-    runs, remark = ladder(engine.name)
+    runs, limit_not_reached = ladder(engine.name)
     if factor not in runs:
         return None, f"nothing moved any more at {max(runs)} times the default"
     if what == "time":
         return runs[factor].milliseconds, ""
-    return distance(runs[factor], runs[max(runs)]), remark
+    return None if limit_not_reached else distance(runs[factor], runs[max(runs)]), limit_not_reached
 
 
 @measured

@@ -185,6 +185,7 @@ def test_a_budget_that_is_not_near_says_how_far_the_last_two_are_apart_and_what_
     ):
         monkeypatch.setattr(audit, "ladder", lambda name, found=(budgets, remark): found)
         assert audit.converged_budget.__wrapped__(engine) == expected
+    assert audit.budgeted.__wrapped__(engine, 4, "distance") == (None, differ)
     for iterates, unit in ((True, "iterations a step"), (False, "steps a frame")):
         engine = dataclasses.replace(engine, iterates=iterates)
         reason = f"the reference is not within 1 % at 4 {unit}"

@@ -81,3 +81,18 @@ def test_a_garment_that_fell_off_has_no_excess():
     assert list(made.index[~made["usable"].astype(bool)]) == ["snug"]
     (table,) = relative_excess(run_of(rows))
     assert [row[1] for row in table.rows] == ["pbns"]
+
+
+def test_a_seed_that_fell_off_is_not_in_the_pooled_share():
+    others = [
+        row(f"tshirt/{c}", m, "energy/total", x)
+        for c in "ab"
+        for m, x in (("simulation", 1.0), ("skinning", 2.0))
+    ]
+    worn = [row(f"tshirt/{clip}", "snug", "energy/total", 1.5) for clip in "ab"]
+    fallen = row("tshirt/a", "snug", "energy/total", -2.0, seed=1)
+    (table,) = relative_excess(run_of([*others, *worn, fallen]))
+    assert table.rows[0][1] == "snug"
+    assert dict(zip((column.name for column in table.columns), table.rows[0]))["pooled"] == pytest.approx(
+        50.0
+    )
