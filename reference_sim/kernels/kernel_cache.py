@@ -29,6 +29,7 @@ from typing import Any
 
 import numba
 import numpy as np
+from filelock import FileLock
 from numba import typeof
 from numba.core.caching import InTreeCacheLocator
 from numba.core.dispatcher import Dispatcher
@@ -64,9 +65,12 @@ def njit(**options: Any) -> Callable[[Any], Any]:
         given = _config.CACHE_LOCATOR_CLASSES
         _config.CACHE_LOCATOR_CLASSES = f"{__name__}.{KernelLocator.__name__}"
         try:
-            return numba.njit(**(options | {"cache": folder is not None}))(function)
+            kernel = numba.njit(**(options | {"cache": folder is not None}))(function)
         finally:
             _config.CACHE_LOCATOR_CLASSES = given
+        if folder:
+            kernel.compile = _one_process_at_a_time(kernel.compile, folder / f"{function.__qualname__}.lock")
+        return kernel
 
     return decorate
 
@@ -85,6 +89,16 @@ class KernelLocator(InTreeCacheLocator):
     def get_source_stamp(self) -> str:
         """Return the digest by which numba knows that the source is the same."""
         return _digests[self._module]
+
+
+def _one_process_at_a_time(compile_kernel: Callable[[Any], Any], lock: Path) -> Callable[[Any], Any]:
+    """Return the compilation of a kernel, for which other processes wait, to find it on disk then."""
+
+    def compile_alone(signature: Any) -> Any:
+        with FileLock(lock):  # a new one each time: none can be taken into a process that is forked
+            return compile_kernel(signature)
+
+    return compile_alone
 
 
 def _digest(function: Any) -> str:
