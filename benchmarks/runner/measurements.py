@@ -74,11 +74,10 @@ def roll_outs_of(
     for cell in cells:
         outcome = needed.get(cell.id())
         if outcome is not None and outcome.files:
-            still = folder.quasi_static_path(*cell.key) if len(outcome.files) > 1 else None
             roll_outs[cell] = RollOut(
                 group, cell.entry, Trajectory.load(folder.trajectory_path(*cell.key)),
                 status=outcome.status, suites=cell.suites,
-                quasi_static=_positions(still) if still else None,
+                quasi_static=_positions(folder.path / outcome.files[1]) if outcome.files[1:] else None,
             )  # fmt: skip
             if not cell.entry.other_mesh:  # others are measured together, vertex by vertex
                 group.roll_outs.append(roll_outs[cell])

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -68,6 +69,11 @@ def test_an_edit_in_another_file_is_seen_and_the_kernel_before_it_stays(name, ol
     assert call(project)[:2] == (value, False)
     (project / name).write_text(source)
     assert call(project)[:2] == (655, True)
+
+
+def test_of_two_processes_that_need_a_kernel_one_compiles_it(project):
+    with ThreadPoolExecutor() as pool:
+        assert {one[:2] for one in pool.map(call, [project, project])} == {(655, False), (655, True)}
 
 
 def test_where_the_package_cannot_be_written_the_cache_of_the_user_serves(project):
