@@ -3,7 +3,8 @@
 A network is tested in each scene over its seeds. Three seeds say little of their scatter, so the scatter
 is pooled over the scenes of the method. A scene that scatters more has its own; one that scatters far more
 stays out of the pool. The test is Student's with the pooled degrees of freedom, by Bonferroni for all these
-tests. A method without seeds is compared with the noise of the reference by as strict a normal quantile.
+tests. A method without seeds is compared with the noise of the reference by a normal quantile at a tenth of
+that level, for at the level itself one of twenty comparisons of equal runs would fail.
 """
 
 from __future__ import annotations
@@ -112,7 +113,7 @@ def changed_scenes(one: pd.DataFrame, other: pd.DataFrame, metrics: dict[str, Me
     if frame.empty:
         return []
     level = LEVEL / 2.0 / len(frame.drop_duplicates([*NETWORK_METRIC, "scene"]))
-    spreads = max(float(stats.norm.isf(level / 10.0)), SPREADS)  # at LEVEL one of 20 fair copies fails
+    spreads = max(float(stats.norm.isf(level / 10.0)), SPREADS)
     groups = frame.groupby(NETWORK_METRIC, sort=False)
     rows = pd.concat([_differences(metrics[name], of_group, spreads) for (_, name), of_group in groups])
     beyond = rows["error"] * stats.t.isf(level, rows["freedom"])
