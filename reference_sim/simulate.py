@@ -8,12 +8,19 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from reference_sim.cloth import Cloth, MeshError
 from reference_sim.command_line import Parser, announce_compilation, command
-from reference_sim.files.mesh_files import read_mesh, read_sequence, refuse_too_many, to_metres_y_up
+from reference_sim.files.mesh_files import (
+    join_seams,
+    read_mesh,
+    read_sequence,
+    refuse_too_many,
+    to_metres_y_up,
+)
 from reference_sim.material import Material
 
 if TYPE_CHECKING:
@@ -46,6 +53,12 @@ def make_parser() -> argparse.ArgumentParser:
     add("--up", choices=("y", "z"), default="y", help="up axis of all meshes (default y)")
     add("--pins", metavar="WHICH", help="vertices that are held, or ride on a moving obstacle beside them: "
         "'0,9,12', or 'top'")  # fmt: skip
+    add(
+        "--weld",
+        type=float,
+        metavar="M",
+        help="make vertices one that are closer [m]; --pins has their new numbers",
+    )
     add("--material", type=Path, metavar="FILE",
         help=".toml: young_modulus [Pa], poisson_ratio, thickness [m], density [kg/m^3], "
         "bending_stiffness [J] (default: the cotton of the SNUG paper)",
@@ -109,6 +122,9 @@ def read_cloth(options: argparse.Namespace) -> Cloth:
     positions = to_metres_y_up(surface.positions, units=options.units, up=options.up)
     try:
         refuse_too_many(len(positions))
+        if options.weld:
+            surface, _ = join_seams(replace(surface, positions=positions), options.weld)
+            positions = surface.positions
         return Cloth(positions, surface.faces, material, pins=choose_pins(options.pins, positions))
     except MeshError as error:
         raise ValueError(f"{options.garment}: {error}") from None

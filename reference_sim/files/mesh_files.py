@@ -198,8 +198,8 @@ LARGEST_STRETCH = 1.5  # from chart to mesh, or its inverse: no cloth is sewn so
 STRETCHED_SHARE = 0.1  # of the area, from which a chart is no pattern
 
 
-def join_seams(surface: Surface) -> tuple[Surface, np.ndarray]:
-    """Join the doubled vertices of a surface in metres: those closer than a micrometre are one.
+def join_seams(surface: Surface, distance: float = JOIN_DISTANCE) -> tuple[Surface, np.ndarray]:
+    """Join the doubled vertices of a surface in metres: those closer than the distance [m] are one.
 
     The number in the file of each vertex left (V,) comes second.
     """
@@ -208,7 +208,7 @@ def join_seams(surface: Surface) -> tuple[Surface, np.ndarray]:
     from scipy.spatial import cKDTree
 
     count = len(surface.positions)
-    pairs = cKDTree(surface.positions).query_pairs(JOIN_DISTANCE, output_type="ndarray")
+    pairs = cKDTree(surface.positions).query_pairs(distance, output_type="ndarray")
     if not len(pairs):
         return surface, np.arange(count)
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))

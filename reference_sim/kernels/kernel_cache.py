@@ -69,7 +69,9 @@ def njit(**options: Any) -> Callable[[Any], Any]:
         finally:
             _config.CACHE_LOCATOR_CLASSES = given
         if folder:
-            kernel.compile = _one_process_at_a_time(kernel.compile, folder / f"{function.__qualname__}.lock")
+            kernel.compile = _one_process_at_a_time(
+                kernel.compile, folder / f"{function.__qualname__}.lock"
+            )
         return kernel
 
     return decorate

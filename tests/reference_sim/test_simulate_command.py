@@ -54,6 +54,24 @@ def test_a_pinned_sheet_in_other_units_and_axes_is_the_same(simulate):
     assert (metres[-1, [0, 6]] == metres[0, [0, 6]]).all() and metres[-1, :, 1].min() < -0.01
 
 
+@pytest.mark.parametrize("gap", [0.0, 1e-4])
+def test_a_seam_left_open_is_refused_and_falls_as_one_sheet_once_it_is_welded(
+    gap, simulate, tmp_path, capsys
+):
+    right = FACES[(SHEET[FACES, 0] > -1e-9).all(axis=1)]
+    cut = np.unique(right[np.abs(SHEET[right, 0]) < 1e-9])
+    place = np.arange(len(SHEET))
+    place[cut] = len(SHEET) + np.arange(len(cut))
+    faces = np.where((SHEET[FACES, 0] > -1e-9).all(axis=1)[:, None], place[FACES], FACES)
+    write_obj(tmp_path / "open.obj", np.concatenate([SHEET, SHEET[cut] + [gap, 0.0, 0.0]]), faces)
+    assert simulate("open.obj -o open.vtkhdf") == 2
+    assert "merge" in capsys.readouterr().err
+    for mesh in ("sheet.obj", "open.obj --weld 0.0002"):
+        assert simulate(f"{mesh} --pins 0,6 --frames 3 -o {mesh[:4]}.vtkhdf") == 0
+    sheet, welded = (Trajectory.load(f"{name}.vtkhdf").positions for name in ("shee", "open"))
+    np.testing.assert_allclose(welded, sheet, atol=1e-9)
+
+
 def test_pins_ride_on_an_obstacle_that_moves_below_them_and_stay_elsewhere(simulate, capsys):
     for pins, moved, said in (("24", 0.02, "1 ride on the obstacle"), ("0,6", 0.0, "2 stay in place")):
         assert simulate(f"sheet.obj --pins {pins} --obstacle ball -o at{pins}.vtkhdf") == 0

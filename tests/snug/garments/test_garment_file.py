@@ -200,6 +200,9 @@ def test_a_seam_is_joined_but_refused_where_a_program_left_it_open(tmp_path, bod
     )
     with pytest.raises(GarmentError, match=says):
         read_garment(path, body)
+    np.testing.assert_array_equal(
+        read_garment(GarmentFile(path=path, weld=2 * gap), body).faces, tube.faces
+    )
     positions[len(tube.rest_positions) :, 0] -= 0.02  # a slit, along which it falls off
     with pytest.raises(GarmentError, match="nothing holds it"):
         read_garment(saved(tmp_path, tube, positions=positions, faces=faces), body)
@@ -209,6 +212,7 @@ def test_a_word_that_means_nothing_is_refused():
     for words, expected in (
         ("uv_scale=2", "add rest=uv"),
         ("units=km", "units=km: choose from m, cm, mm"),
+        ("weld=0", "give a distance above 0"),
     ):
         with pytest.raises(ValueError, match=expected):
             parse_garment_file(f"a.obj,{words}")
