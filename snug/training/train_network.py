@@ -1,4 +1,4 @@
-"""Train a network, or make an untrained one. The command is snug.train.
+"""Train a network. The command is snug.train.
 
 Between the steps of a training come its log and checkpoints.
 """
@@ -8,7 +8,6 @@ from __future__ import annotations
 import gc
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,9 +21,8 @@ from snug.recipe import Recipe
 from snug.training.captured_step import CapturedTrainer
 from snug.training.checkpoint import Checkpoint, describe_run
 from snug.training.device import find_device
-from snug.training.optimisation_step import Trainer, start_network
+from snug.training.optimisation_step import Trainer
 from snug.training.simulated_data import Trajectories
-from snug.training.training_set import TrainingSet
 
 
 class TrainingLoop:
@@ -186,29 +184,3 @@ def train_network(
         setup_seconds=time.perf_counter() - start,
     )  # fmt: skip
     return loop.run()
-
-
-def untrained_model(
-    model_kind: str,
-    dressed: DressedBody,
-    motions: Sequence[Motion],
-    *,
-    seed: int,
-    recipe: Recipe | None = None,
-) -> TrainedModel:
-    """Return a network before any step, a row of the benchmark's tables.
-
-    The default recipe starts at a zero last layer, where the untrained network is skinning alone. So this
-    one keeps the random last layer of the recipe's rules: the answer of a network that has learned
-    nothing. Input statistics are those of the training motions. Without a recipe it is the kind's.
-    """
-    kind = find_kind(model_kind)
-    recipe = replace(recipe or kind.recipe, zero_last_layer=False)
-    data = TrainingSet(
-        dressed, motions, recipe, features=kind.network.feature_set, sequences=kind.network.sequential
-    )
-    network = start_network(model_kind, data, seed=seed)
-    return TrainedModel(
-        model_kind, network.eval(), recipe, seed=seed, unit=kind.unit, fps=1.0 / data.dt,
-        triangles=digest_of_triangles(dressed.garment.faces),
-    )  # fmt: skip

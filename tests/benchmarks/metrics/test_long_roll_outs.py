@@ -14,9 +14,8 @@ from benchmarks.scenes import find_scene, hard_motions
 from benchmarks.scenes.hard_motions import ENDS, EVERY, FRAMES, LOOP_BLEND
 from snug.motion.library import make_motion
 from snug.networks.roll_out import roll_out
-from snug.training.train_network import untrained_model
 from tests.benchmarks.runner.tasks_by_hand import assets_of, grouped, prepared
-from tests.snug.training.dressing import swaying, tube_dress
+from tests.snug.training.dressing import swaying, tube_dress, untrained_model
 
 SMOKE = PRESETS[0]
 

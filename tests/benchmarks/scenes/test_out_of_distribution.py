@@ -26,10 +26,9 @@ from snug.motion.library import make_motion
 from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
-from snug.training.train_network import untrained_model
 from tests.benchmarks.plan.planned import planned
 from tests.benchmarks.runner.tasks_by_hand import grouped, plan_of, prepared, trajectory_of
-from tests.snug.training.dressing import tailored
+from tests.snug.training.dressing import tailored, untrained_model
 
 SMOKE = find_preset("smoke")
 

@@ -10,8 +10,7 @@ from snug.networks.garment_network import make_network
 from snug.networks.roll_out import RollOutError, prepare_frame_inputs, prepare_frames, roll_out
 from snug.networks.trained_model import TrainedModel
 from snug.recipe import DEFAULT
-from snug.training.train_network import untrained_model
-from tests.snug.training.dressing import swaying, tube_dress
+from tests.snug.training.dressing import swaying, tube_dress, untrained_model
 
 SHAPED = np.array([0.0, 2.0, 0, 0, 0, 0, 0, 0, 0, 0])
 

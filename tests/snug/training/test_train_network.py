@@ -13,8 +13,7 @@ from snug.networks.trained_model import ModelFileError, TrainedModel
 from snug.recipe import DEFAULT
 from snug.train import choose_motions, main, parse_options
 from snug.training.augmentation import augment
-from snug.training.train_network import untrained_model
-from tests.snug.training.dressing import PLAIN, make_trainer, short, swaying, tube_dress
+from tests.snug.training.dressing import PLAIN, make_trainer, short, swaying, tube_dress, untrained_model
 
 
 @pytest.mark.parametrize(
