@@ -16,7 +16,7 @@ from functools import cache
 import numpy as np
 
 from benchmarks.results.protocol import DRAWS, LEVEL, SEED, SOFTENING, TIE, noise, trend
-from reports.statistics.means_and_spreads import Mean
+from reports.statistics.means_and_spreads import Mean, mean_by_recording
 
 RATIO, EXCESS, DIFFERENCE = "ratio", "excess", "difference"  # scales
 RANGE = "range"  # what the limits of a cost are
@@ -290,17 +290,7 @@ def _moved_by(mean: Mean, name: str, scale: str, scenes: Collection[str]) -> flo
     return float(np.mean(list(mean_by_recording(changes).values())))
 
 
-SEGMENT = re.compile(r"(?<=/)(\d+_\d+)_[a-z](?=@|$)")
 RECORDING = re.compile(r"/\d+_\d+(_[a-z])?(@|$)")  # names of clips of the library, and of segments
-
-
-def recording_of(scene: str) -> str:
-    """Return the name of a scene, for a segment of a recording that of the whole: without its letter.
-
-    >>> recording_of("tshirt/01_01_a@clip"), recording_of("tshirt/06_15"), recording_of("tshirt/kick")
-    ('tshirt/01_01@clip', 'tshirt/06_15', 'tshirt/kick')
-    """
-    return SEGMENT.sub(r"\1", scene)
 
 
 def is_recorded(scene: str) -> bool:
@@ -310,18 +300,6 @@ def is_recorded(scene: str) -> bool:
     (True, False)
     """
     return RECORDING.search(scene) is not None
-
-
-def mean_by_recording(cells: Mapping[tuple[str, int], float]) -> dict[tuple[str, int], float]:
-    """Return (recording, seed) -> mean over the segments of the recording."""
-    values: dict[tuple[str, int], list[float]] = {}
-    for (scene, seed), value in cells.items():
-        values.setdefault((recording_of(scene), seed), []).append(value)
-    # Where all are one number their mean is it, to the bit: what every motion repeats is certain.
-    return {
-        cell: of_segments[0] if len(set(of_segments)) == 1 else float(np.mean(of_segments))
-        for cell, of_segments in values.items()
-    }
 
 
 def _grid(mean: Mean, scale: str) -> np.ndarray:

@@ -25,11 +25,10 @@ from reports.statistics.effects import (
     Effect,
     effect,
     is_recorded,
-    mean_by_recording,
     off_scale,
     on_scale,
 )
-from reports.statistics.means_and_spreads import Mean, pair
+from reports.statistics.means_and_spreads import Mean, mean_by_recording, pair
 
 TOTAL = "energy/total"
 LEAST = -100.0  # [%] of a garment that is worn

@@ -21,8 +21,8 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
 
     methods: rows in place of these.
 
-    Relative excess, penetration and dynamics are means over its motions, energy gaps and times over the
-    scenes in which solvers were timed.
+    Relative excess, penetration and dynamics are means over its sources of motion, energy gaps and times
+    over the scenes in which solvers were timed.
     """
     garment = run.first_garment
     rows_of_garment = run.garment_rows[run.garment_rows["garment"] == garment]
@@ -65,9 +65,8 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
         *(metric_column(metric) for metric, _ in sources),
     ]  # fmt: skip
     of_motions = (
-        f"{garment}: excess as a geometric mean over independent sources, the rest as arithmetic means over "
-        "motions. In own energies: over the minimum of what the network was trained on (a dash: of vertices, "
-        "or without a minimum)"
+        f"{garment}: means over independent sources of motion, of excess geometric. In own energies: over "
+        "the minimum of what the network was trained on (a dash: of vertices, or without a minimum)"
     )
     caption = of_motions if garment else f"Means {in_scenes(scenes)}"
     caption += f"; run times (and energy gaps) {in_scenes(scenes)}." if garment and scenes else "."

@@ -12,8 +12,7 @@ import numpy as np
 import pandas as pd
 
 from reports.finished_run import Run
-from reports.statistics.effects import recording_of
-from reports.statistics.means_and_spreads import shared_scenes
+from reports.statistics.means_and_spreads import recording_of, shared_scenes
 from reports.tables.table import Cell, Column, Table, listed, table
 
 TEST_CLIPS = ("01_01", "07_02", "104_54", "55_27")
