@@ -30,7 +30,7 @@ from reports.scene_changes import (
 )
 from reports.statistics.effects import DIFFERENCE, RATIO, Effect, effect
 from reports.statistics.means_and_spreads import Mean, means, value_of
-from reports.statistics.pareto import NETWORK, REPEATS, TIME, WHOLE, compared_scenes
+from reports.statistics.pareto import NETWORK, REPEATS, TIME, WHOLE, timed_rows
 from reports.statistics.relative_excess import (
     RELATIVE_EXCESS,
     excess_of,
@@ -182,7 +182,7 @@ def _headline(
 
     Run times are of the scenes that page one has them of.
     """
-    garment, clips = run.first_garment, compared_scenes(run, run.cells("speed", "garments"))
+    garment, (_, clips) = run.first_garment, timed_rows(run, run.frame)
     usable = [f[f["usable"] & (f["case"] == "")] for f in frames]
     worn, timed = (
         _shared([f[f[column].isin(names)] for f in usable], "scene", "method", "metric")
@@ -341,7 +341,7 @@ def _metrics(run: Run) -> dict[str, Metric]:
 
 
 def _effect(metric: Metric, new: Mean, before: Mean) -> Effect:
-    """Compute the effect of a change; of relative excess in points, of which 100 are skinning's excess."""
+    """Compute the effect of a change; of relative excess in points."""
     if metric.name.startswith("relative_excess/"):
         return effect(new, before, DIFFERENCE, unit=100.0)
     return effect(new, before, DIFFERENCE) if metric.arbitrary_zero else effect_of(metric, new, before)

@@ -60,14 +60,14 @@ def select_roll_outs(
 
 
 def _stored(folder: RunFolder, run: Run, scene: str) -> str:
-    """Return of which methods a run has kept roll-outs in a scene, or in which scenes where it has none there."""
+    """Return the methods of which a run has kept roll-outs in a scene, or the scenes where it has any."""
     cells = run.cells()[["scene", "method", "seed"]].drop_duplicates().itertuples(index=False, name=None)
     stored = [cell for cell in cells if folder.trajectory_path(*cell).is_file()]
-    if not stored:
+    there = [method for name, method, _ in stored if name == scene]
+    known = dict.fromkeys(there or [name for name, *_ in stored])
+    if not known:
         return "this run has kept no roll-outs, as a published one"
-    if there := {method: None for name, method, _ in stored if name == scene}:
-        return f"roll-outs there are of {', '.join(there)}"
-    return f"scenes with roll-outs are {', '.join(dict.fromkeys(name for name, *_ in stored))}"
+    return f"{'roll-outs there' if there else 'scenes with roll-outs'} are {', '.join(known)}"
 
 
 def write_frames(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:

@@ -176,17 +176,13 @@ def effect(one: Mean, other: Mean, scale: str = "", *, unit: float | None = None
         scale: RATIO where both are positive, else DIFFERENCE, unless it is given.
         unit: see Effect; the larger mean where none is given.
 
-    Segments of one recording are one motion, the mean of its segments on the scale. Positive numbers are
-    compared by their logarithms, cell by cell.
+    Segments of one recording are one motion, the mean of its segments on the scale.
 
-    The standard error is that of a bootstrap that draws motions and seeds, each with replacement and of
-    each one fewer than there are: the variance is then that of the mean, not (n - 1) / n of it
-    (Hesterberg 2015). Motions are drawn for both methods at once; so are seeds within a pairing group,
-    others by themselves. Drawn crossed, the variance is on average no smaller than the true one (Owen
-    2007, "The pigeonhole bootstrap"). The interval is the value and Student's quantile times the error;
-    the degrees of freedom are Satterthwaite's (1946), of the parts that motions and seeds have in the
-    variance. A network of one seed is taken to have the scatter of the one beside it. What is the same with
-    every motion or seed is one number and was not repeated.
+    The standard error is that of a bootstrap of motions and seeds, of each one fewer than there are, so that
+    its variance is that of the mean (Hesterberg 2015). Motions are drawn for both methods at once, as seeds
+    are within a pairing group. Drawn crossed, the variance is on average no smaller than the true one (Owen
+    2007, "The pigeonhole bootstrap"). Degrees of freedom are Satterthwaite's (1946). A network of one seed
+    is taken to have the scatter of the one beside it.
     """
     scale = scale or (RATIO if _positive(one) and _positive(other) else DIFFERENCE)
     first, second = (_grid(mean, scale) for mean in (one, other))

@@ -40,7 +40,7 @@ def paper_tables(run: Run) -> list[Table]:
 
 
 def _samples(run: Run, methods: Sequence[str], metric: str) -> Mapping[str, pd.Series]:
-    """Return set of motions -> evaluated frames of each scene in which all the methods have the metric."""
+    """Return set of motions -> evaluated frames of each scene that all the methods have."""
     if run.frame_energies.empty:
         return {}
     rows = run.garment_rows[run.garment_rows["garment"] == run.first_garment]

@@ -19,7 +19,7 @@ from reference_sim.files.atomic_files import replacing
 from reports.finished_run import Run
 from reports.statistics.effects import RANGE, Effect
 from reports.statistics.means_and_spreads import pair, recording_of
-from reports.statistics.pareto import compared_scenes, run_time
+from reports.statistics.pareto import run_time, timed_rows
 from reports.statistics.relative_excess import TOTAL, excess_of, own_excess_of, with_relative_excess
 from reports.statistics.verdicts import effect_of
 from reports.tables.table import DASH, METHOD, Cell, Column, Table, column_texts, metric_column
@@ -33,7 +33,7 @@ CITATION = "Neural garments versus a reference solver: a physics-validation benc
 
 
 def write_paper_table(folder: RunFolder, run: Run) -> Table:
-    """Write for_your_paper.csv, whose rows repeat the caption, and for_your_paper.tex; return the table."""
+    """Write for_your_paper.csv, with the caption in each row, and .tex; return the table."""
     table = paper_table(run)
     rows = tuple((*row, table.caption) for row in table.rows)
     columns = (*table.columns, Column("caption", "Caption", text=True))
@@ -50,10 +50,9 @@ def paper_table(run: Run) -> Table:
     apart = {"", *run.standing_apart(rows), *run.twins, *run.with_role("reference-variant")}
     rows = rows[~rows["method"].isin(apart)]
     usable, excesses = rows[rows["usable"]], with_relative_excess(run, rows)
-    scenes = compared_scenes(run, cells := run.cells("speed", "garments"))
-    timed = cells[cells["scene"].isin(scenes)] if scenes else rows
-    sources = [(name, rows) for name in METRICS] + [(run_time(timed), timed)]
-    sources = [(run.metrics[name], of) for name, of in sources if name in set(of[of["usable"]]["metric"])]
+    timed, _ = timed_rows(run, rows)
+    queries = [(name, rows) for name in METRICS] + [(run_time(timed), timed)]
+    sources = [(run.metrics[name], of) for name, of in queries if name in set(of[of["usable"]]["metric"])]
     lines: list[tuple[Cell, ...]] = []
     for method in run.ordered(usable["method"]):
         of_method = usable[(usable["method"] == method) & usable["metric"].isin((TOTAL, *METRICS))]

@@ -156,7 +156,7 @@ def test_all_cloths_are_in_sight_of_one_camera_in_every_frame():
     [
         (
             ["--methods", "snug,simulatoin"],
-            "'simulatoin' in tshirt/walk: roll-outs there are of simulation,",
+            "'simulatoin' in tshirt/walk: roll-outs there are simulation,",
         ),
         (["--scene", "tshirt-walk"], "in tshirt-walk: scenes with roll-outs are tshirt/walk"),
         (["-o", "x.avi"], "x.avi: a film ends in .gif, a picture in .png"),
