@@ -54,7 +54,7 @@ class Heading:
 
 @dataclass(frozen=True)
 class TableBlock:
-    """A table, of which the PDF prints at most so many lines, without those that end in one of `left_out`."""
+    """A table; the PDF prints at most so many lines, none that ends in one of `left_out`."""
 
     name: str
     most: int = ROWS

@@ -30,7 +30,7 @@ from reports.scene_changes import (
 )
 from reports.statistics.effects import DIFFERENCE, RATIO, Effect, effect
 from reports.statistics.means_and_spreads import Mean, means, value_of
-from reports.statistics.pareto import NETWORK, REPEATS, TIME, WHOLE
+from reports.statistics.pareto import NETWORK, REPEATS, TIME, WHOLE, timed_rows
 from reports.statistics.relative_excess import (
     RELATIVE_EXCESS,
     excess_of,
@@ -129,10 +129,10 @@ def compare(
         ResultsError: where protocols differ, of the runs or of a cell, or presets, sizes, body or
             garment, nothing is shared, or a results.csv is not of its digest.
     """
-    for run in (one, other):
+    for name, run in (("A", one), ("B", other)):
         if "results.csv" in run.changed:
             raise ResultsError(
-                "results.csv of A or B is not as its run wrote it: run.json has its digest"
+                f"results.csv of {name} is not as its run wrote it: run.json has its digest"
             )
     one_protocol((one.protocol, other.protocol), "A and B")
     _demand_same_scenes(one, other)
@@ -178,26 +178,33 @@ HEADLINE = (
 def _headline(
     run: Run, frames: Sequence[pd.DataFrame], changes: Sequence[Change]
 ) -> dict[str, list[str]]:
-    """Return the rows of Comparison.headline, on the scenes of the first garment that both runs have."""
-    garment = run.first_garment
-    usable = [f[f["usable"] & (f["place"] == garment) & (f["case"] == "")] for f in frames]
-    worn = _shared(usable, "scene", "method", "metric")
+    """Return the rows of Comparison.headline, on the scenes of the first garment that both runs have.
+
+    Run times are of the scenes that page one has them of.
+    """
+    garment, (_, clips) = run.first_garment, timed_rows(run, run.frame)
+    usable = [f[f["usable"] & (f["case"] == "")] for f in frames]
+    worn, timed = (
+        _shared([f[f[column].isin(names)] for f in usable], "scene", "method", "metric")
+        for column, names in (("place", [garment]), ("scene", clips))
+    )
     names = run.ordered(set(worn[0]["method"]) - run.twins - set(run.with_role("reference-variant")))
-    rows = {}
+    headline = {}
     for method in sorted(names, key=lambda name: name != NETWORK):
         seeds = [set(f[(f["method"] == method) & f["seeded"]]["seed"]) for f in worn]
         verdict = "one seed" if len(seeds[0]) == len(seeds[1]) == 1 else "same"
         cells = []
         for metric in HEADLINE:
-            before, after = (_value(run, frame, method, metric) for frame in worn)
+            rows = timed if metric == WHOLE and clips else worn
+            before, after = (_value(run, frame, method, metric) for frame in rows)
             verdicts = {c.place: c.verdict for c in changes if (c.method, c.metric) == (method, metric)}
             scenes = " and ".join(sorted({f"{change} in a scene" for change in verdicts.values()}))
             note = verdicts.get(garment) or scenes or verdict
             whole = before is not None and after is not None
             cells.append(f"{number(before)} → {number(after)} {note}" if whole else DASH)
         if set(cells) != {DASH}:
-            rows[method] = cells
-    return rows
+            headline[method] = cells
+    return headline
 
 
 def _value(run: Run, rows: pd.DataFrame, method: str, metric: str) -> float | None:
@@ -334,7 +341,7 @@ def _metrics(run: Run) -> dict[str, Metric]:
 
 
 def _effect(metric: Metric, new: Mean, before: Mean) -> Effect:
-    """Compute the effect of a change; of relative excess in points, of which 100 are skinning's excess."""
+    """Compute the effect of a change; of relative excess in points."""
     if metric.name.startswith("relative_excess/"):
         return effect(new, before, DIFFERENCE, unit=100.0)
     return effect(new, before, DIFFERENCE) if metric.arbitrary_zero else effect_of(metric, new, before)

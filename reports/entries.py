@@ -1,4 +1,4 @@
-"""The page of entries: one table for each protocol and set of scenes, beside the project's own methods."""
+"""The page of entries: a table for each protocol and set of scenes, with the project's methods."""
 
 from __future__ import annotations
 

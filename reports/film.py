@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from benchmarks.results.run_folder import RunFolder
 from reference_sim.command_line import Parser, command
 from reference_sim.files.atomic_files import demand_writable_folder, replacing
 from reports.pictures import AZIMUTH, BODY_COLOUR, CLOTH_COLOUR, INK, PAPER, SceneRollOuts, draw_frames
+
+if TYPE_CHECKING:
+    from reports.finished_run import Run
 
 EXAMPLES = """examples:
   python -m reports.film reports/runs/NAME --scene tshirt/kick --methods simulation,snug -o kick.gif
@@ -49,14 +52,22 @@ def select_roll_outs(
         shown_seed = of_method["seed"].min() if seed is None or not of_method["seeded"].any() else seed
         cloth = run.roll_outs.cloth(scene, method, int(shown_seed)) if len(of_method) else None
         if cloth is None or not cloth.finite().frames:
-            stored = sorted(path.parent.name for path in folder.trajectories.glob("*/*.vtkhdf"))
-            reason = (
-                "; ".join(run.problems) or f"scenes with roll-outs are {', '.join(dict.fromkeys(stored))}"
-            )
+            reason = "; ".join(run.problems) or _stored(folder, run, scene)
             raise ResultsError(f"{folder.path}: no roll-out of '{method}' in {scene}: {reason}")
         cloths[method] = cloth.finite()
     labels = {name: run.label(name) for name in cloths}
     return SceneRollOuts(scene, cloths, run.roll_outs.body(scene), labels)
+
+
+def _stored(folder: RunFolder, run: Run, scene: str) -> str:
+    """Return the methods of which a run has kept roll-outs in a scene, or the scenes where it has any."""
+    cells = run.cells()[["scene", "method", "seed"]].drop_duplicates().itertuples(index=False, name=None)
+    stored = [cell for cell in cells if folder.trajectory_path(*cell).is_file()]
+    there = [method for name, method, _ in stored if name == scene]
+    known = dict.fromkeys(there or [name for name, *_ in stored])
+    if not known:
+        return "this run has kept no roll-outs, as a published one"
+    return f"{'roll-outs there' if there else 'scenes with roll-outs'} are {', '.join(known)}"
 
 
 def write_frames(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:

@@ -180,7 +180,7 @@ class Run:
 
     @property
     def twins(self) -> set[str]:
-        """Simulations as valid as the reference, which only show its noise: no rows of tables and figures."""
+        """Simulations as valid as the reference: its noise, and no rows of tables."""
         return {*SECOND_STARTS, "simulation-refrozen", "simulation-1e-8"} & self.methods.keys()
 
     def label(self, method: str) -> str:
@@ -198,7 +198,7 @@ class Run:
         return remarks
 
     def standing_apart(self, frame: pd.DataFrame) -> set[str]:
-        """Return the ablations among these rows whose base has a usable number: they have their own table."""
+        """Return the ablations whose base has a usable number: they have their own table."""
         usable = set(frame[frame["usable"]]["method"])
         return {name for name in self.with_role("ablation") if self.methods[name].base in usable}
 

@@ -1,4 +1,4 @@
-"""The PDF: its content as values that the template lays out, report blocks and what stands around them."""
+"""The PDF: its content as values that the template lays out."""
 
 from __future__ import annotations
 

@@ -4,7 +4,7 @@ A network is tested in each scene over its seeds. Three seeds say little of thei
 is pooled over the scenes of the method. A scene that scatters more has its own; one that scatters far more
 stays out of the pool. The test is Student's with the pooled degrees of freedom, by Bonferroni for all these
 tests. A method without seeds is compared with the noise of the reference by a normal quantile at a tenth of
-that level, for at the level itself one of twenty comparisons of equal runs would fail.
+that level.
 """
 
 from __future__ import annotations

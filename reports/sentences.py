@@ -13,7 +13,7 @@ from reports.finished_run import Run
 from reports.statistics.means_and_spreads import value_of
 from reports.statistics.outcomes import BAD, EXTERNAL, LEARNED, counted, leads, published_verdicts
 from reports.statistics.paper_claims import counts, in_words, judged
-from reports.statistics.pareto import compared_scenes, run_time
+from reports.statistics.pareto import run_time, timed_rows
 from reports.statistics.relative_excess import RELATIVE_EXCESS, excess_of, with_relative_excess
 from reports.statistics.verdicts import compare_methods
 from reports.tables.table import number
@@ -22,7 +22,7 @@ ALIKE = "dynamics/correlation"
 
 
 def headline(run: Run) -> list[tuple[str, str]]:
-    """Return (topic, its sentences) for each topic of page one that the run can tell, the verdict first."""
+    """Return (topic, its sentences) for each topic of page one, the verdict first."""
     texts = {**_measured(run), "How it ended": endings(run)}
     return [(topic, unbroken(text)) for topic, text in texts.items() if text]
 
@@ -96,10 +96,8 @@ def verdict(run: Run, worn: pd.DataFrame) -> str:
 
 
 def _times_faster(run: Run, name: str) -> int:
-    """Return to one digit how many times as long the reference takes at least; 0 where that is not known."""
-    cells = run.cells("speed", "garments")
-    scenes = compared_scenes(run, cells)
-    timed = cells[cells["scene"].isin(scenes)] if scenes else run.garment_rows
+    """Return to one digit how many times as long the reference takes; 0 where that is unknown."""
+    timed, _ = timed_rows(run, run.garment_rows)
     metric = run.metrics.get(run_time(timed))
     faster = compare_methods(run, timed, metric, run.reference, name).effect if metric else None
     least = min(faster.interval or (faster.shown,)) if faster else 0.0
@@ -122,7 +120,7 @@ def _kind(run: Run, scenes: Collection[str]) -> str:
 
 
 def _certainty(run: Run) -> str:
-    """Say which primary claims hold; one seed decides next to nothing: there the published verdicts stand."""
+    """Say which primary claims hold, with one seed also which hold in the published run."""
     counted_claims = counts(judged(run))
     if not counted_claims:
         return ""

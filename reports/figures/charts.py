@@ -46,9 +46,7 @@ if TYPE_CHECKING:
 
 SOLVERS = Style("Solvers stopped early", "#A3324B", "X")
 STARTED = "warm-started"  # role of solvers that start from another method
-OF_REFERENCE = (
-    "reference-variant"  # role of methods that only say how the reference depends on its options
-)
+OF_REFERENCE = "reference-variant"  # role of simulations with other options than the reference's
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ the marker repeats what the colour says, for print in grey.
 from __future__ import annotations
 
 import math
-import re
+import textwrap
 import zlib
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -189,16 +189,6 @@ def power_text(value: float) -> str:
     return f"{mantissa}e{int(power)}"
 
 
-def wrapped(name: str, width: int) -> str:
-    """Break a long name into lines, after a separator where there is one."""
-    lines = [""]
-    for piece in re.findall(rf"[^_/ :-]{{1,{max(width - 1, 1)}}}[_/ :-]?|[_/ :-]", name):
-        if lines[-1] and len(lines[-1]) + len(piece) > width:
-            lines.append("")
-        lines[-1] += piece
-    return "\n".join(line.strip() for line in lines)
-
-
 def printable(text: str) -> str:
     """Return the text with letters that the typesetter's fonts do not have as "U+88FE"."""
     missing = {c for c in text if c.isalpha() and not c.isascii()} - _letters()
@@ -223,7 +213,7 @@ def _legend(figure: Canvas, entries: Sequence[Style], columns: int) -> Legend:
 
     handles = [
         Line2D([], [], color=look.colour, marker=look.marker, markersize=4.0,
-               label=wrapped(look.label, 30), ls=look.line)
+               label=textwrap.fill(look.label, 30), ls=look.line)
         for look in entries
     ]  # fmt: skip
     return figure.legend(

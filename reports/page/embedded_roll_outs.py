@@ -221,7 +221,7 @@ def _comparable(cloth: Trajectory, reference: Trajectory) -> bool:
 
 
 def _depths(cloths: Mapping[str, Trajectory], skin: Obstacle) -> dict[str, np.ndarray]:
-    """Return method -> penetration (T,V) [mm]; all of a frame at once, for its search tree is the cost."""
+    """Return method -> penetration (T,V) [mm]; a frame's search tree is built once."""
     depths = {method: np.zeros(cloth.positions.shape[:2]) for method, cloth in cloths.items()}
     for frame in range(skin.frames):
         methods = [method for method, cloth in cloths.items() if frame < cloth.frames]

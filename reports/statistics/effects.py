@@ -16,7 +16,7 @@ from functools import cache
 import numpy as np
 
 from benchmarks.results.protocol import DRAWS, LEVEL, SEED, SOFTENING, TIE, noise, trend
-from reports.statistics.means_and_spreads import Mean
+from reports.statistics.means_and_spreads import Mean, mean_by_recording
 
 RATIO, EXCESS, DIFFERENCE = "ratio", "excess", "difference"  # scales
 RANGE = "range"  # what the limits of a cost are
@@ -176,17 +176,13 @@ def effect(one: Mean, other: Mean, scale: str = "", *, unit: float | None = None
         scale: RATIO where both are positive, else DIFFERENCE, unless it is given.
         unit: see Effect; the larger mean where none is given.
 
-    Segments of one recording are one motion, the mean of its segments on the scale. Positive numbers are
-    compared by their logarithms, cell by cell.
+    Segments of one recording are one motion, the mean of its segments on the scale.
 
-    The standard error is that of a bootstrap that draws motions and seeds, each with replacement and of
-    each one fewer than there are: the variance is then that of the mean, not (n - 1) / n of it
-    (Hesterberg 2015). Motions are drawn for both methods at once; so are seeds within a pairing group,
-    others by themselves. Drawn crossed, the variance is on average no smaller than the true one (Owen
-    2007, "The pigeonhole bootstrap"). The interval is the value and Student's quantile times the error;
-    the degrees of freedom are Satterthwaite's (1946), of the parts that motions and seeds have in the
-    variance. A network of one seed is taken to have the scatter of the one beside it. What is the same with
-    every motion or seed is one number and was not repeated.
+    The standard error is that of a bootstrap of motions and seeds, of each one fewer than there are, so that
+    its variance is that of the mean (Hesterberg 2015). Motions are drawn for both methods at once, as seeds
+    are within a pairing group. Drawn crossed, the variance is on average no smaller than the true one (Owen
+    2007, "The pigeonhole bootstrap"). Degrees of freedom are Satterthwaite's (1946). A network of one seed
+    is taken to have the scatter of the one beside it.
     """
     scale = scale or (RATIO if _positive(one) and _positive(other) else DIFFERENCE)
     first, second = (_grid(mean, scale) for mean in (one, other))
@@ -290,17 +286,7 @@ def _moved_by(mean: Mean, name: str, scale: str, scenes: Collection[str]) -> flo
     return float(np.mean(list(mean_by_recording(changes).values())))
 
 
-SEGMENT = re.compile(r"(?<=/)(\d+_\d+)_[a-z](?=@|$)")
 RECORDING = re.compile(r"/\d+_\d+(_[a-z])?(@|$)")  # names of clips of the library, and of segments
-
-
-def recording_of(scene: str) -> str:
-    """Return the name of a scene, for a segment of a recording that of the whole: without its letter.
-
-    >>> recording_of("tshirt/01_01_a@clip"), recording_of("tshirt/06_15"), recording_of("tshirt/kick")
-    ('tshirt/01_01@clip', 'tshirt/06_15', 'tshirt/kick')
-    """
-    return SEGMENT.sub(r"\1", scene)
 
 
 def is_recorded(scene: str) -> bool:
@@ -310,18 +296,6 @@ def is_recorded(scene: str) -> bool:
     (True, False)
     """
     return RECORDING.search(scene) is not None
-
-
-def mean_by_recording(cells: Mapping[tuple[str, int], float]) -> dict[tuple[str, int], float]:
-    """Return (recording, seed) -> mean over the segments of the recording."""
-    values: dict[tuple[str, int], list[float]] = {}
-    for (scene, seed), value in cells.items():
-        values.setdefault((recording_of(scene), seed), []).append(value)
-    # Where all are one number their mean is it, to the bit: what every motion repeats is certain.
-    return {
-        cell: of_segments[0] if len(set(of_segments)) == 1 else float(np.mean(of_segments))
-        for cell, of_segments in values.items()
-    }
 
 
 def _grid(mean: Mean, scale: str) -> np.ndarray:

@@ -1,12 +1,14 @@
 """Means of rows over scenes and seeds, and ±, the spread over seeds or the uncertainty of the reference.
 
 Only finite values of cells that ended ok, or stalled at some frames, enter a mean. It is first taken over
-the scenes of one seed, then over seeds; the spread is the standard deviation over seeds (n - 1).
+the segments of a recording, then over the recordings of one seed, which are independent sources of motion,
+then over seeds; the spread is the standard deviation over seeds (n - 1).
 """
 
 from __future__ import annotations
 
 import math
+import re
 from collections import defaultdict
 from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
@@ -66,6 +68,30 @@ class Mean:
         return "" if self.complete else f" ({len(self.cells)} of {self.asked} roll-outs)"
 
 
+SEGMENT = re.compile(r"(?<=/)(\d+_\d+)_[a-z](?=@|$)")
+
+
+def recording_of(scene: str) -> str:
+    """Return the name of a scene, for a segment of a recording that of the whole: without its letter.
+
+    >>> recording_of("tshirt/01_01_a@clip"), recording_of("tshirt/06_15"), recording_of("tshirt/kick")
+    ('tshirt/01_01@clip', 'tshirt/06_15', 'tshirt/kick')
+    """
+    return SEGMENT.sub(r"\1", scene)
+
+
+def mean_by_recording(cells: Mapping[tuple[str, int], float]) -> dict[tuple[str, int], float]:
+    """Return (recording, seed) -> mean over the segments of the recording."""
+    values: dict[tuple[str, int], list[float]] = {}
+    for (scene, seed), value in cells.items():
+        values.setdefault((recording_of(scene), seed), []).append(value)
+    # Where all are one number their mean is it, to the bit: what every motion repeats is certain.
+    return {
+        cell: of_segments[0] if len(set(of_segments)) == 1 else fmean(of_segments)
+        for cell, of_segments in values.items()
+    }
+
+
 # Columns that means are made of; a frame may lack the last two.
 READ = ["scene", "seed", "status", "usable", "value", "seeded", "pairing_group", "uncertainty", "moved"]
 
@@ -103,15 +129,16 @@ def means(frame: pd.DataFrame, *keys: str) -> pd.Series:
 
 def _mean(lines: Sequence[Any], scenes: int, failed: Set[int]) -> Mean:
     """Return the mean of usable rows; scenes: how many should have it, failed: seeds with a failed cell."""
+    cells = {(line.scene, line.seed): line.value for line in lines}
     by_seed: dict[int, list[float]] = {}
-    for line in lines:
-        by_seed.setdefault(line.seed, []).append(line.value)
+    for (_, seed), of_recording in mean_by_recording(cells).items():
+        by_seed.setdefault(seed, []).append(of_recording)
     of_seeds = [fmean(values) for values in by_seed.values()]
     value, freedom = fmean(of_seeds), len(of_seeds) - 1
     # As statistics.stdev, which sums fractions: that took a third of the time of all means.
     middle = value if len(set(of_seeds)) > 1 else of_seeds[0]  # the mean of equal numbers may be rounded
     spread = math.dist(of_seeds, [middle] * len(of_seeds)) / math.sqrt(freedom) if freedom else None
-    uncertainties = [line.uncertainty for line in lines if not math.isnan(line.uncertainty)]
+    unsure = {(line.scene, line.seed): line.uncertainty for line in lines if line.uncertainty >= 0.0}
     return Mean(
         value=value,
         spread=spread,
@@ -119,9 +146,9 @@ def _mean(lines: Sequence[Any], scenes: int, failed: Set[int]) -> Mean:
         asked=scenes * len(by_seed.keys() | failed),
         stalled=any(line.status == "stalled" for line in lines),
         seeded=any(line.seeded for line in lines),
-        cells={(line.scene, line.seed): line.value for line in lines},
+        cells=cells,
         pairing_group=lines[0].pairing_group,
-        uncertainty=fmean(uncertainties) if uncertainties else None,
+        uncertainty=fmean(mean_by_recording(unsure).values()) if unsure else None,
         moved={
             (line.scene, line.seed): dict(line.moved)
             for line in lines
@@ -131,7 +158,7 @@ def _mean(lines: Sequence[Any], scenes: int, failed: Set[int]) -> Mean:
 
 
 def mean_of(frame: pd.DataFrame, method: str, metric: str) -> Mean | None:
-    """Return the mean over the scenes and seeds that have the metric, None without any."""
+    """Return the mean over the recordings and seeds that have the metric, None without any."""
     rows = frame[(frame["metric"] == metric) | ~frame["usable"]]
     return means(rows, "method", "metric").get((method, metric))
 

@@ -32,7 +32,7 @@ def check_name(run: Run, row: Any) -> str:
 
 
 def tolerances_away(row: Any) -> float | None:
-    """Return |measured - expected| / tolerance; a number that must be exact is 0 or infinitely many away."""
+    """Return |measured - expected| / tolerance; of a number that must be exact 0 or infinite."""
     distance = abs(row.value - row.expected)
     if pd.isna(distance) or pd.isna(row.tolerance):
         return None
@@ -96,7 +96,7 @@ def read_published(folder: Path) -> Run:
 
 
 def published_verdicts() -> str:
-    """Return how the published run decides the primary claims, in words; empty where it is not installed."""
+    """Return how the published run decides the primary claims; empty where it is not installed."""
     path = PUBLISHED / DEFAULT / "tables" / "findings.csv"
     if not path.is_file():
         return ""

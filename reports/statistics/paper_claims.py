@@ -16,8 +16,15 @@ from benchmarks.metric import Metric
 from benchmarks.results.protocol import LEAST_MOTIONS
 from benchmarks.results.row import BEFORE_FRAMES
 from reports.finished_run import Run
-from reports.statistics.effects import DIFFERENCE, RATIO, Effect, effect, recording_of
-from reports.statistics.means_and_spreads import HALF, half_of, pair, share_of_frames, with_shares
+from reports.statistics.effects import DIFFERENCE, RATIO, Effect, effect
+from reports.statistics.means_and_spreads import (
+    HALF,
+    half_of,
+    pair,
+    recording_of,
+    share_of_frames,
+    with_shares,
+)
 from reports.statistics.verdicts import (
     LESS,
     MORE,

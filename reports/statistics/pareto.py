@@ -30,7 +30,6 @@ class Point:
 
     time_spread: largest less smallest repeat [ms], else two standard deviations over seeds. error_spread:
     one standard deviation over seeds or, where that is more, the noise of the reference. Both 0 if unknown.
-    fewer: remark on seeds that are missing, empty where none is.
     """
 
     method: str
@@ -38,7 +37,6 @@ class Point:
     error: float
     time_spread: float = 0.0
     error_spread: float = 0.0
-    fewer: str = ""
 
 
 def points_of(run: Run, frame: pd.DataFrame, scenes: Sequence[str], metric: str) -> list[Point]:
@@ -65,11 +63,7 @@ def points_of(run: Run, frame: pd.DataFrame, scenes: Sequence[str], metric: str)
         spread = 2.0 * (time.spread or 0.0)
         if repeats is not None and inference is not None:
             spread = inference.value * repeats.value / 100.0
-        points.append(
-            Point(
-                method, time.value, error.value, spread, error.spread_or_uncertainty or 0.0, error.fewer
-            )
-        )
+        points.append(Point(method, time.value, error.value, spread, error.spread_or_uncertainty or 0.0))
     return points
 
 
@@ -138,44 +132,40 @@ def compared_cells(run: Run) -> tuple[pd.DataFrame, list[str]]:
 
 
 def error_points(run: Run, rows: pd.DataFrame, metric: str) -> list[Point]:
-    """Return the points of one panel; the reference, whose error is zero by construction, is none of them."""
+    """Return the points of one panel, without the reference, whose error is zero."""
     points = points_of(run, rows, list(dict.fromkeys(rows["scene"])), metric)
     # Smaller steps have errors of the garment, but none of the reference's own step.
     left_out = (SMALLER_STEPS,) if metric in OWN_STEP else ()
-    reference = run.with_role("reference")
-    timed_points = [
-        p for p in points if run.methods[p.method].family not in left_out and p.method not in reference
-    ]
-    return [p for p in timed_points if p.time > 0.0]
+    others = [p for p in points if p.method != run.reference and p.time > 0.0]
+    return [p for p in others if run.methods[p.method].family not in left_out]
 
 
 NETWORK = "snug"  # the method whose accuracy a solver has to reach to be its rival
 ACCURACIES = ("gap/energy", "curvature/histogram")
 
 
-def rivals(run: Run, frame: pd.DataFrame, scenes: Sequence[str]) -> list[str]:
+def rivals(run: Run, timed: pd.DataFrame) -> list[str]:
     """Return the solvers that SNUG competes with: the reference, and the fastest ones as accurate."""
-    names = (
-        [run.reference] if mean_of(frame[frame["scene"].isin(list(scenes))], run.reference, TIME) else []
-    )
+    names = [run.reference] if mean_of(timed, run.reference, TIME) else []
     for metric in ACCURACIES:
-        points = points_of(run, frame, scenes, metric)
+        points = points_of(run, timed, list(dict.fromkeys(timed["scene"])), metric)
         network = next((p for p in points if p.method == NETWORK), None)
         best = fastest(solvers(run, points), network.error) if network else None
         names += [best.method] if best else []
     return list(dict.fromkeys(names))
 
 
-def compared_scenes(run: Run, frame: pd.DataFrame) -> list[str]:
-    """Return the scenes of the first garment in which SNUG was timed beside a truncated solver.
+def timed_rows(run: Run, others: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
+    """Return the rows of scenes of the first garment in which SNUG and solvers were timed.
 
-    Those of suite speed where there are any: whole motions have no energy gap.
+    Their names come second. Of suite speed where it has any: whole motions have no energy gap.
+    others: rows where there are none.
     """
-    timed = frame[frame["usable"] & (frame["metric"] == TIME) & (frame["garment"] != "")]
+    cells = run.cells("speed", "garments")
+    timed = cells[cells["usable"] & (cells["metric"] == TIME) & (cells["garment"] != "")]
     levels = {name for name, method in run.methods.items() if method.level is not None}
-    both = set(timed[timed["method"] == NETWORK]["scene"]) & set(
-        timed[timed["method"].isin(levels)]["scene"]
-    )
-    rows = timed[timed["scene"].isin(both)]
+    of_network, of_solvers = timed["method"] == NETWORK, timed["method"].isin(levels)
+    rows = timed[timed["scene"].isin({*timed[of_network]["scene"]} & {*timed[of_solvers]["scene"]})]
     of_speed = rows[rows["suite"] == "speed"]
-    return next(iter(run.garments(of_speed if len(of_speed) else rows).values()), [])
+    scenes = next(iter(run.garments(of_speed if len(of_speed) else rows).values()), [])
+    return cells[cells["scene"].isin(scenes)] if scenes else others, scenes

@@ -25,11 +25,10 @@ from reports.statistics.effects import (
     Effect,
     effect,
     is_recorded,
-    mean_by_recording,
     off_scale,
     on_scale,
 )
-from reports.statistics.means_and_spreads import Mean, pair
+from reports.statistics.means_and_spreads import Mean, mean_by_recording, pair
 
 TOTAL = "energy/total"
 LEAST = -100.0  # [%] of a garment that is worn
@@ -150,7 +149,7 @@ class Excess:
         return self.effect.shown
 
     def typical_of(self, *, recorded: bool) -> float | None:
-        """Return the typical value of recorded motions alone, or of the others alone; None without any."""
+        """Return the typical value of recorded motions or of the others; None without any."""
         scaled = {
             cell: float(on_scale(value, EXCESS)) for cell, value in self.cells.items()
             if is_recorded(cell[0]) == recorded

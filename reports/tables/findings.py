@@ -67,9 +67,8 @@ def findings(run: Run) -> list[Table]:
 
 
 EXCESS_NOTE = (
-    "Typical: mean over motions and seeds of arcsinh(x / 1 %), taken back: a geometric mean well above 1 %, "
-    "arithmetic well below. Segments of a recording count as one motion. A garment below "
-    f"{LEAST:g} % has fallen off and counts as failed. {VERDICTS}"
+    "Typical: sinh of the mean of arcsinh(x / 1 %) over sources and seeds; a recording's segments are one. "
+    f"A garment below {LEAST:g} % has fallen off and counts as failed. {VERDICTS}"
 )
 
 
@@ -93,9 +92,8 @@ def relative_excess(run: Run) -> list[Table]:
         Column("motions", "Motions"), Column("verdict", "Energy against the reference", text=True),
     )  # fmt: skip
     caption = (
-        "Relative excess, (E - E_reference) / (E_skinning - E_reference) of the total energy E. Typical "
-        "(geometric, with its interval): over independent sources and seeds. Recorded, others: "
-        "typical of the library's recordings, and of other motions. Pooled: ratio of the sums over motions."
+        "Relative excess, (E - E_reference) / (E_skinning - E_reference) of the total energy E. Recorded, "
+        "others: typical of the library's recordings, of other motions. Pooled: ratio of sums over motions."
     )
     means = table("relative_excess", columns, lines, caption, grouped_by=("garment",), note=EXCESS_NOTE)
     return [*means, *_by_time_step(run, excesses)]

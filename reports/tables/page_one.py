@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from reports.finished_run import Run
 from reports.statistics.means_and_spreads import mean_of
 from reports.statistics.outcomes import EXTERNAL, leads
-from reports.statistics.pareto import compared_scenes, rivals, run_time
+from reports.statistics.pareto import rivals, run_time, timed_rows
 from reports.statistics.relative_excess import SKINNING, excess_of, own_excess_of, with_relative_excess
 from reports.tables.table import METHOD, Cell, Column, Table, in_scenes, metric_column, table
 
@@ -21,14 +21,12 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
 
     methods: rows in place of these.
 
-    Relative excess, penetration and dynamics are means over its motions, energy gaps and times over the
-    scenes in which solvers were timed.
+    Relative excess, penetration and dynamics are means over its sources of motion, energy gaps and times
+    over the scenes in which solvers were timed.
     """
     garment = run.first_garment
     rows_of_garment = run.garment_rows[run.garment_rows["garment"] == garment]
-    cells = run.cells("speed", "garments")
-    scenes = compared_scenes(run, cells)
-    timed = cells[cells["scene"].isin(scenes)] if scenes else rows_of_garment
+    timed, scenes = timed_rows(run, rows_of_garment)
     rows_of_garment = timed if rows_of_garment.empty else rows_of_garment  # of a run of suite speed alone
     plain = set(rows_of_garment[rows_of_garment["usable"]]["method"]) - run.standing_apart(
         rows_of_garment
@@ -39,7 +37,7 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     # Of a family of networks the last one: that of the highest level.
     last = {run.methods[m].family: m for m in others}
     listed += [m for m in last.values() if m not in listed]
-    best = rivals(run, cells, scenes) if scenes else []
+    best = rivals(run, timed) if scenes else []
     solvers = [m for m in best if m not in listed]
     listed = run.ordered(methods or [*listed[: ROWS - len(solvers)], *solvers])
     queries = [(name, rows_of_garment) for name in ANSWERS] + [(GAP, timed), (run_time(timed), timed)]
@@ -65,9 +63,8 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
         *(metric_column(metric) for metric, _ in sources),
     ]  # fmt: skip
     of_motions = (
-        f"{garment}: excess as a geometric mean over independent sources, the rest as arithmetic means over "
-        "motions. In own energies: over the minimum of what the network was trained on (a dash: of vertices, "
-        "or without a minimum)"
+        f"{garment}: means over independent sources of motion, of excess geometric. In own energies: over "
+        "the minimum of what the network was trained on (a dash: of vertices, or without a minimum)"
     )
     caption = of_motions if garment else f"Means {in_scenes(scenes)}"
     caption += f"; run times (and energy gaps) {in_scenes(scenes)}." if garment and scenes else "."

@@ -12,8 +12,7 @@ import numpy as np
 import pandas as pd
 
 from reports.finished_run import Run
-from reports.statistics.effects import recording_of
-from reports.statistics.means_and_spreads import shared_scenes
+from reports.statistics.means_and_spreads import recording_of, shared_scenes
 from reports.tables.table import Cell, Column, Table, listed, table
 
 TEST_CLIPS = ("01_01", "07_02", "104_54", "55_27")
@@ -41,7 +40,7 @@ def paper_tables(run: Run) -> list[Table]:
 
 
 def _samples(run: Run, methods: Sequence[str], metric: str) -> Mapping[str, pd.Series]:
-    """Return set of motions -> evaluated frames of each scene in which all the methods have the metric."""
+    """Return set of motions -> evaluated frames of each scene that all the methods have."""
     if run.frame_energies.empty:
         return {}
     rows = run.garment_rows[run.garment_rows["garment"] == run.first_garment]

@@ -121,7 +121,7 @@ OTHERS, MEAN_BODY = "other shapes", "mean shape"
 
 
 def shapes(run: Run) -> list[Table]:
-    """Tabulate each method on all other bodies together and on the mean body, with its relative excess."""
+    """Tabulate each method on all other bodies together and on the mean body."""
     cells = run.cells("shapes")
     shape_rows = cells[(cells["metric"] == SHAPE) & cells["usable"]]
     norms = shape_rows.drop_duplicates("scene").set_index("scene")["value"]

@@ -232,6 +232,7 @@ REMARKS = {
     "§": "§ The interval is over motions alone: there is no second seed, or seeds make no difference.",
     "#": "# The range over motions and seeds.",
 }
+SPREAD = "±: standard deviation over seeds or, if larger, noise of the reference or a sample's error."
 _COVERED = {"seeds": "‡", "motions": "§", RANGE: "#"}
 SMALL = 1e-3  # what is asked for in more digits and lies below it is an error: two digits say enough
 
@@ -239,17 +240,8 @@ SMALL = 1e-3  # what is asked for in more digits and lies below it is an error: 
 def remarks_below(table: Table, lines: Sequence[Sequence[CellText]]) -> str:
     """Return the remarks below a table: its note, the meaning of its ± and of the marks in its lines."""
     remarks = [table.note] if table.note else []
-    means = [cell for row in table.rows for cell in row if isinstance(cell, Mean)]
-    kinds = []
-    if any(mean.spread for mean in means):
-        seeds = sorted({mean.seeds for mean in means if mean.spread is not None})
-        kinds.append(f"standard deviation over {' or '.join(map(str, seeds))} seeds")
-    if any(mean.uncertainty for mean in means):
-        kinds.append("the noise of the reference, or a sample's error")
-    if kinds:
-        lone = any(m.spread_or_uncertainty is None for m in means)
-        without = " Without it: one seed, or nothing random." if lone and len(kinds) == 1 else ""
-        remarks.append(f"±: {' or, where larger, '.join(kinds)}.{without}")
+    if any(isinstance(cell, Mean) and cell.spread_or_uncertainty for row in table.rows for cell in row):
+        remarks.append(SPREAD)
     marks = {mark for line in lines for cell in line for mark in cell["mark"]}
     return " ".join([*remarks, *(REMARKS[mark] for mark in sorted(marks))])
 

@@ -1,6 +1,7 @@
 """A table for a paper, as CSV and as LaTeX: what reviewers of learned garments ask for.
 
-Numbers are means over independent sources of motion, of a source over its segments, and over seeds.
+Numbers are those of page one: means over independent sources of motion, of a source over its segments, and
+over seeds, of times over the scenes in which solvers were timed.
 """
 
 from __future__ import annotations
@@ -16,10 +17,10 @@ from benchmarks.results.protocol import LEAST_MOTIONS
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.files.atomic_files import replacing
 from reports.finished_run import Run
-from reports.statistics.effects import RANGE, Effect, recording_of
-from reports.statistics.means_and_spreads import pair
-from reports.statistics.pareto import run_time
-from reports.statistics.relative_excess import excess_of, own_excess_of, with_relative_excess
+from reports.statistics.effects import RANGE, Effect
+from reports.statistics.means_and_spreads import pair, recording_of
+from reports.statistics.pareto import run_time, timed_rows
+from reports.statistics.relative_excess import TOTAL, excess_of, own_excess_of, with_relative_excess
 from reports.statistics.verdicts import effect_of
 from reports.tables.table import DASH, METHOD, Cell, Column, Table, column_texts, metric_column
 
@@ -32,7 +33,7 @@ CITATION = "Neural garments versus a reference solver: a physics-validation benc
 
 
 def write_paper_table(folder: RunFolder, run: Run) -> Table:
-    """Write for_your_paper.csv, whose rows repeat the caption, and for_your_paper.tex; return the table."""
+    """Write for_your_paper.csv, with the caption in each row, and .tex; return the table."""
     table = paper_table(run)
     rows = tuple((*row, table.caption) for row in table.rows)
     columns = (*table.columns, Column("caption", "Caption", text=True))
@@ -49,24 +50,28 @@ def paper_table(run: Run) -> Table:
     apart = {"", *run.standing_apart(rows), *run.twins, *run.with_role("reference-variant")}
     rows = rows[~rows["method"].isin(apart)]
     usable, excesses = rows[rows["usable"]], with_relative_excess(run, rows)
-    metrics = [run.metrics[name] for name in (*METRICS, run_time(rows)) if name in set(usable["metric"])]
+    timed, _ = timed_rows(run, rows)
+    queries = [(name, rows) for name in METRICS] + [(run_time(timed), timed)]
+    sources = [(run.metrics[name], of) for name, of in queries if name in set(of[of["usable"]]["metric"])]
     lines: list[tuple[Cell, ...]] = []
     for method in run.ordered(usable["method"]):
-        of_method = usable[usable["method"] == method]
+        of_method = usable[(usable["method"] == method) & usable["metric"].isin((TOTAL, *METRICS))]
         common = excess_of(run, excesses, method) if method != run.reference else None
         effects = [own_excess_of(run, rows, method), common.effect if common else None]
-        effects += [_mean(rows, method, metric) for metric in metrics]
+        effects += [_mean(of, method, metric) for metric, of in sources]
         counts = of_method["scene"].map(recording_of).nunique(), of_method["seed"].nunique()
         lines.append((method, *counts, *(effect and _cell(effect) for effect in effects)))
     columns = [
-        METHOD, Column("motions", "Motions"), Column("seeds", "Seeds"),
+        METHOD, Column("sources", "Sources"), Column("seeds", "Seeds"),
         Column("own_excess", "Own excess", "%"), Column("relative_excess", "Relative excess", "%"),
-        *map(metric_column, metrics),
+        *(metric_column(metric) for metric, _ in sources),
     ]  # fmt: skip
+    whole = any(isinstance(cell, Effect) for line in lines for cell in line)
     caption = (
         f"{run.first_garment or 'All scenes'}: means over independent sources of motion and over seeds, of "
-        "excess geometric; below: 95 % intervals, of times the range. Excess: energy above a reference "
-        "solver's as a share of skinning's, in each method's own energies and in common ones. "
+        f"excess geometric{'; below: 95 % intervals, of times the range' if whole else ''}. Excess: energy "
+        "above a reference solver's as a share of skinning's, in each method's own energies and in common "
+        "ones. "
         f"Protocol {run.protocol or 'own'}; cite: {CITATION}, at {run.config.get('commit') or 'no commit'}."
     )
     rounded = tuple(replace(column, digits=2) for column in columns)

@@ -36,7 +36,7 @@ from reports.statistics.effects import RATIO
 from reports.statistics.means_and_spreads import mean_of
 from reports.statistics.outcomes import PUBLISHED, read_published
 from reports.statistics.paper_claims import EXPLORATORY, PRIMARY, UNSEEN, Claim, Judged, judged
-from reports.statistics.pareto import NETWORK, WHOLE, compared_scenes
+from reports.statistics.pareto import NETWORK, WHOLE, timed_rows
 from reports.statistics.relative_excess import excess_of, with_relative_excess
 from reports.statistics.verdicts import measure_of
 from reports.tables import make_tables
@@ -134,9 +134,8 @@ def front_sentences(run: Run) -> str:
     Raises:
         KeyError: the method or claim of which a number is missing.
     """
-    worn, cells = run.garment_rows, run.cells("speed", "garments")
-    timed = cells[cells["scene"].isin(compared_scenes(run, cells))]
-    rows = with_relative_excess(run, worn)
+    worn = run.garment_rows
+    rows, (timed, _) = with_relative_excess(run, worn), timed_rows(run, worn)
     names = (NETWORK, "supervised", "pbns", SOLVER)
     excesses = {name: excess for name in names if (excess := excess_of(run, rows, name))}
     p_values = {line.claim.says: line.p for line in judged(run) if line.p is not None}

@@ -274,7 +274,7 @@ def test_the_chief_metrics_of_each_method_stand_in_few_lines_snug_first(tmp_path
     [
         ("none", [], "none"),
         ("a", ["--metrics", "energy/strian"], "nothing to compare"),
-        ("spoilt", [], "results.csv of A or B is not as its run wrote it"),
+        ("spoilt", [], "results.csv of B is not as its run wrote it"),
     ],
 )
 def test_bad_input_is_one_line_and_status_2(tmp_path, refused, b, options, says):

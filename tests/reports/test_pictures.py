@@ -154,7 +154,11 @@ def test_all_cloths_are_in_sight_of_one_camera_in_every_frame():
 @pytest.mark.parametrize(
     ("change", "hint"),
     [
-        (["--methods", "snug,simulatoin"], "no roll-out of 'simulatoin' in tshirt/walk: scenes"),
+        (
+            ["--methods", "snug,simulatoin"],
+            "'simulatoin' in tshirt/walk: roll-outs there are simulation,",
+        ),
+        (["--scene", "tshirt-walk"], "in tshirt-walk: scenes with roll-outs are tshirt/walk"),
         (["-o", "x.avi"], "x.avi: a film ends in .gif, a picture in .png"),
         (["--speed", "0"], "--speed is 0.01 to 10"),
         (["--width", "7"], "--width 64 to 2000"),

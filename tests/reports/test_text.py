@@ -108,13 +108,18 @@ def test_the_table_for_a_paper_has_intervals_counts_protocol_and_columns_of_the_
     lines = pd.read_csv(tmp_path / "for_your_paper.csv", na_values="-").set_index("method")
     assert list(lines.index) == ["simulation", "skinning", "snug"]
     snug = lines.loc["snug"]
-    assert (snug["motions"], snug["seeds"]) == (5, 2)
+    assert (snug["sources"], snug["seeds"]) == (5, 2)
     assert snug["relative_excess [%]"] == pytest.approx(10, 0.2)
     assert snug["relative_excess_low"] < snug["relative_excess [%]"] < snug["relative_excess_high"]
     assert snug["penetration/surface [%]"] == 2.5
     assert snug["penetration/surface_low"] == pytest.approx(0.537, 1e-2)
     assert snug["cost/frame [ms]"] == 0.25 and not {"distance/rms [mm]", "own_excess [%]"} & set(lines)
     assert "Protocol 2.0; cite: Neural garments" in snug["caption"] and "abc123" in snug["caption"]
+    assert "intervals" in snug["caption"]
+    write_paper_table(
+        RunFolder(tmp_path), run_of([r for r in rows_for_a_paper() if r.scene == "tshirt/m0"])
+    )
+    assert "intervals" not in (tmp_path / "for_your_paper.csv").read_text(encoding="utf-8")
 
 
 def test_the_latex_of_the_table_for_a_paper_is_sound_whatever_names_hold(tmp_path):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from reports.statistics import effects
+from reports.statistics import effects, means_and_spreads
 from reports.statistics.effects import (
     DIFFERENCE,
     EXCESS,
@@ -135,11 +135,22 @@ SEGMENTS = [f"tshirt/01_01_{letter}" for letter in "abcdefg"] + [
 MOTIONS = [*SEGMENTS, *(f"tshirt/{k:02d}_03" for k in range(3, 8)), "tshirt/kick", "tshirt/punch"]
 
 
+def test_a_mean_is_over_sources_of_motion_of_which_the_segments_of_a_recording_are_one():
+    values = {"01_01_a": 1.0, "01_01_b": 3.0, "kick": 10.0}
+    rows = [
+        row(f"tshirt/{motion}", "snug", "energy/strain", x, uncertainty=x) for motion, x in values.items()
+    ]
+    mean = mean_of(run_of(rows).frame, "snug", "energy/strain")
+    assert (mean.value, mean.uncertainty, len(mean.cells)) == (6.0, 6.0, 3)
+
+
 @pytest.mark.parametrize("alike", [0.0, 0.5, 1.0])
 def test_segments_of_a_recording_are_no_independent_motions(alike, monkeypatch):
-    recordings = [effects.recording_of(scene) for scene in MOTIONS]
+    recordings = [means_and_spreads.recording_of(scene) for scene in MOTIONS]
     _, place = np.unique(recordings, return_inverse=True)
-    assert place.max() == 8 and effects.recording_of("tshirt/01_01_a@clip") == "tshirt/01_01@clip"
+    assert (
+        place.max() == 8 and means_and_spreads.recording_of("tshirt/01_01_a@clip") == "tshirt/01_01@clip"
+    )
     random = np.random.default_rng(5)
 
     def interval():
@@ -159,7 +170,7 @@ def test_segments_of_a_recording_are_no_independent_motions(alike, monkeypatch):
         effect(constant, replace(constant, cells=dict.fromkeys(same, 0.1)), DIFFERENCE).interval is None
     )
     if alike:
-        monkeypatch.setattr(effects, "recording_of", lambda scene: scene)
+        monkeypatch.setattr(means_and_spreads, "recording_of", lambda scene: scene)
         assert held() < 0.85
 
 
