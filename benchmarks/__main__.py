@@ -14,7 +14,7 @@ COMMANDS = {
     "submit": ("benchmarks.submit", "check and score an entry"),
     "publish": ("benchmarks.publish", "run published studies again"),
     "train": ("snug.train", "train a network"),
-    "check-garment": ("snug.check", "say whether a garment, body or motion can be used"),
+    "check-garment": ("snug.check", "say whether a garment can be used on a body"),
     "simulate": ("reference_sim.simulate", "simulate meshes of your own"),
     "report": ("reports.build", "make the report of a run again"),
     "compare": ("reports.compare", "compare two runs"),

@@ -35,7 +35,7 @@ Files, as far as the scene has what they hold:
                      [kg], pins (P,), pin_positions (T,P,3); rest_uv [m], the flat rest state; kept (T,),
                      the frames of the motion that a roll-out holds
   energies.npz       elements of each energy term: vertices, stiffness, rest state; formulas in
-                     docs/scene-files.md
+                     docs/method.md
   obstacle.npz       positions (T,B,3) of what the cloth touches, one frame where it stands still, faces;
                      rest_positions (B,3), the body unposed
   motion_smpl.npz    poses (T,72) [rad], trans (T,3), betas, fps: SMPL's 24 joints, y up. Of a part of a
@@ -49,7 +49,7 @@ Files, as far as the scene has what they hold:
 With a body:
 A vertex p at rest goes to sum_j w_j (R_j p + t_j), (R_j, t_j) = transforms. The motion is
 placed on the floor with its arms clear of the torso: --motions would place it anew.
-The zero of gravity's energy in a frame is origin_heights, the height of the pelvis.
+The zero of gravity's energy in a frame is origin_heights of scene.json, the height of the pelvis.
 Contact: a sample of the cloth touches only faces of the body near its own place at rest:
 those whose centroid at rest lies within {contact_region_m} m of the sample's.
 

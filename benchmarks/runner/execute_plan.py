@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, NoReturn
 from benchmarks.external.roll_out_files import MODULE as STORED
 from benchmarks.external.roll_out_files import RollOutFileError
 from benchmarks.plan.plan import Plan, runs
-from benchmarks.results.row import Row
+from benchmarks.results.row import USABLE, Row
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.executor import Executor
@@ -68,6 +68,10 @@ def execute(plan: Plan, assets: Assets | None = None) -> int:
     lines = [*ends, *runner.broken()]
     if failures := len(lines):
         lines[MOST_FAILURES:] = ["more in results.csv and run.json"] * (failures > MOST_FAILURES)
+    ran = {row.method for row in log.rows if row.status != "skipped"}
+    lines += {
+        r.method: f"{r.method}: skipped: {r.reason}" for r in log.rows if r.method not in ran
+    }.values()
     if runner.reused:
         lines.append(f"{len(runner.reused)} results taken from earlier runs in this folder")
     print(*lines, sep="\n", end="\n" if lines else "", file=sys.stderr)
@@ -80,7 +84,7 @@ def ends_with(folder: RunFolder, rows: Sequence[Row]) -> Iterator[str]:
     """Yield the paths of a run's page, PDF and rows, and commands that may come next."""
     for path in (folder.page_path, folder.report_path, folder.rows_path):
         yield f"{path.suffix[1:]:4}  {path.resolve()}"
-    seen = [row for row in rows if row.passed and row.metric == "cost/frame"]
+    seen = [row for row in rows if row.status in USABLE and row.metric == "cost/frame"]
     if seen:
         methods = list(dict.fromkeys(row.method for row in seen if row.scene == seen[0].scene))
         shown = f"--scene {seen[0].scene} --methods {','.join(methods[:4])}"

@@ -19,6 +19,7 @@ IN_SHEET = ("--scene", "hanging_sheet", "--set", "sizes=smoke")
 FINER = "return Trajectory(np.zeros((10, 3, 3)), np.array([[0, 1, 2]]), np.arange(10) * scene.dt)"
 BREACHES = {  # a line of run(): what is said of it
     "x = x[:, :-1]": "floats (10, 49, 3) are due",
+    "x = x[:-1]": "gives 9 of 10 frames",
     "x[-1, 0] = np.nan": "has a position that is not finite in frame 9",
     "x[0] += 1e-3": "frame 0 is off the scene's start: put scene.start there",
     "x[3] += 1e-3": "a pin is off its place in frame 3",
