@@ -30,13 +30,13 @@ PAPER_COSTS = (
 
 
 def _by_garment(run: Run, name: str) -> list[Table]:
-    """Tabulate means over the motions of each garment.
+    """Tabulate means over the sources of motion of each garment.
 
     Ablations, which stand beside their base, and perturbed references are left out; one of the latter is
     the floor of vertex-wise curvature.
     """
     title = name.replace("_", " ").capitalize()
-    which = "timed" if name == "cost" else "the"
+    sources = "timed motions" if name == "cost" else "sources of motion"
     metrics, lines = pivot(run, run.garment_rows, name, ("garment", "method"))
     twins = run.twins - (set(SECOND_STARTS[:1]) if name == "curvature" else set())
     apart = {
@@ -46,7 +46,7 @@ def _by_garment(run: Run, name: str) -> list[Table]:
     return table(
         name, (GARMENT, METHOD, *map(metric_column, metrics)),
         [line for line in lines if line[1] not in apart[line[0]]],
-        f"{title}: mean over {which} motions and seeds of each garment.", grouped_by=("garment",),
+        f"{title}: means over {sources} and seeds.", grouped_by=("garment",),
         note=PAPER_COSTS if name == "cost" else "",
     )  # fmt: skip
 
