@@ -60,7 +60,7 @@ def select_roll_outs(
 
 
 def _stored(folder: RunFolder, run: Run, scene: str) -> str:
-    """Return the methods of which a run has kept roll-outs in a scene, or the scenes where it has any."""
+    """Return the methods of the roll-outs in a scene, or the scenes that have any."""
     cells = run.cells()[["scene", "method", "seed"]].drop_duplicates().itertuples(index=False, name=None)
     stored = [cell for cell in cells if folder.trajectory_path(*cell).is_file()]
     there = [method for name, method, _ in stored if name == scene]
