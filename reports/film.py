@@ -60,14 +60,14 @@ def select_roll_outs(
 
 
 def _stored(folder: RunFolder, run: Run, scene: str) -> str:
-    """Return the methods of which a run has kept roll-outs in a scene, or the scenes where it has any."""
+    """Return the methods of the roll-outs in a scene, or the scenes that have any."""
     cells = run.cells()[["scene", "method", "seed"]].drop_duplicates().itertuples(index=False, name=None)
     stored = [cell for cell in cells if folder.trajectory_path(*cell).is_file()]
-    there = [method for name, method, _ in stored if name == scene]
-    known = dict.fromkeys(there or [name for name, *_ in stored])
-    if not known:
+    methods = [method for name, method, _ in stored if name == scene]
+    names = dict.fromkeys(methods or [name for name, *_ in stored])
+    if not names:
         return "this run has kept no roll-outs, as a published one"
-    return f"{'roll-outs there' if there else 'scenes with roll-outs'} are {', '.join(known)}"
+    return f"{'roll-outs there' if methods else 'scenes with roll-outs'} are {', '.join(names)}"
 
 
 def write_frames(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:

@@ -138,7 +138,8 @@ def _mean(lines: Sequence[Any], scenes: int, failed: Set[int]) -> Mean:
     # As statistics.stdev, which sums fractions: that took a third of the time of all means.
     middle = value if len(set(of_seeds)) > 1 else of_seeds[0]  # the mean of equal numbers may be rounded
     spread = math.dist(of_seeds, [middle] * len(of_seeds)) / math.sqrt(freedom) if freedom else None
-    unsure = {(line.scene, line.seed): line.uncertainty for line in lines if line.uncertainty >= 0.0}
+    known = (line for line in lines if not math.isnan(line.uncertainty))
+    unsure = {(line.scene, line.seed): line.uncertainty for line in known}
     return Mean(
         value=value,
         spread=spread,

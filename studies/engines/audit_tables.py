@@ -75,7 +75,7 @@ def markdown(table: pd.DataFrame) -> str:
 
 
 if __name__ == "__main__":
-    results = pd.read_csv(Path(sys.argv[1]) / "results.csv", low_memory=False)
+    results = pd.read_csv(next(Path(sys.argv[1]).glob("results.csv*")), low_memory=False)
     for name, table in tables(results).items():
         print(f"{name}\n\n{markdown(table)}\n")
         if sys.argv[2:]:
