@@ -193,12 +193,8 @@ def check_method(entry: MethodEntry, scene: BuiltScene, make: Callable[..., Meth
 
     answer, seconds = run(seed)
     x, stated = np.asarray(answer.positions, np.float64), float(np.nansum(answer.frame_seconds))
-    demand(
-        (
-            len(x) == scene.frames or answer.status == "diverged",
-            f"gives {len(x)} of {scene.frames} frames",
-        )
-    )
+    whole = len(x) == scene.frames or answer.status == "diverged"
+    demand((whole, f"gives {len(x)} of {scene.frames} frames"))
     bad = np.flatnonzero(~np.isfinite(x).all(axis=(1, 2)))
     changed = [name for name, text in fingerprints(scene).items() if before.get(name) != text]
     near = PLACE_TOLERANCE * max(1.0, np.abs(scene.start).max())

@@ -62,7 +62,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "-o", "--out", metavar="DIR", default=WORK, type=Path, help=f"where the runs lie (default {WORK})"
     )
     options = parser.parse_args(arguments)
-    known, head, failed = published_studies(), commit(), 0
+    known = [name for name in study_names() if read_study(name).show]
+    head, failed = commit(), 0
     if options.studies == [REFERENCES]:
         from benchmarks.references import VERTICES, write_garment
         from snug import Body, find_template  # loads libraries of meshes
@@ -72,7 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             print(make_reference(f"tshirt/{motion}", options.out / REFERENCES), flush=True)
         return 0
     names = options.studies or known
-    if silent := [name for name in names if read_study(name).show is None]:
+    if silent := [name for name in names if not read_study(name).show]:
         raise StudyError(f"study {silent[0]}: has no [show]: the studies {', '.join(known)} do")
     if head.endswith("+changes"):
         raise StudyError(f"{head}: commit the changes first, so that a commit says what was run")
@@ -125,11 +126,6 @@ def make_reference(name: str, out: Path) -> Path:
     }
     known = replace(reference, metrics=metrics, origin=log.origin, networks=networks)
     return references.write_reference(scene, plan, known, built)
-
-
-def published_studies() -> list[str]:
-    """Return the names of the studies that have a table [show]."""
-    return [name for name in study_names() if read_study(name).show is not None]
 
 
 def with_seeds(name: str) -> Study:

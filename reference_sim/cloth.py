@@ -236,7 +236,7 @@ def _refuse_open_seams(positions: np.ndarray, faces: np.ndarray, rim: np.ndarray
     place = ", ".join(f"{x:.3f}" for x in positions[apart.min()])
     raise MeshError(
         f"{len(np.unique(apart))} vertices of a seam lie up to {gap:.2g} mm apart, one at ({place}) m: merge "
-        f"vertices closer than {1.1 * gap:.2g} mm (weld, in m); where a slit is meant, open it wider"
+        f"vertices closer than {1.1 * gap:.2g} mm (weld); where a slit is meant, open it wider"
     )
 
 

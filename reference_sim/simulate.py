@@ -53,12 +53,8 @@ def make_parser() -> argparse.ArgumentParser:
     add("--up", choices=("y", "z"), default="y", help="up axis of all meshes (default y)")
     add("--pins", metavar="WHICH", help="vertices that are held, or ride on a moving obstacle beside them: "
         "'0,9,12', or 'top'")  # fmt: skip
-    add(
-        "--weld",
-        type=float,
-        metavar="M",
-        help="make vertices one that are closer [m]; --pins has their new numbers",
-    )
+    add("--weld", type=float, metavar="M",
+        help="join vertices that are closer [m], before --pins counts them")  # fmt: skip
     add("--material", type=Path, metavar="FILE",
         help=".toml: young_modulus [Pa], poisson_ratio, thickness [m], density [kg/m^3], "
         "bending_stiffness [J] (default: the cotton of the SNUG paper)",

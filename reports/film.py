@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable, Sequence
 from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -24,11 +24,10 @@ EXAMPLES = """examples:
   python -m reports.film reports/runs/NAME --scene tshirt/kick --methods simulation,mine -o kick.png
   python -m reports.film reports/runs/NAME --scene tshirt/kick --methods snug -o kick.pc2
 
-A .png is the frame in which the first method's inertia term is largest. A .pc2 is no film: it gives
-kick_snug.pc2 and kick_body.pc2, the vertices of each method and of the body, with an .obj each, in metres, y
-up, for Blender's Mesh Cache modifier.
+A .png is the frame in which the first method's inertia term is largest. A .pc2 becomes kick_snug.pc2 and
+kick_body.pc2, all vertices, with an .obj each: metres, y up, for Blender's Mesh Cache modifier.
 
-The camera goes along with the garment; a roll-out that ended early keeps its last frame and says so.
+The camera follows the garment; a roll-out that ended early keeps its last frame.
 exit status: 0 written; 2 the run has no such roll-out: one line says why."""
 SHADES = 40  # of either colour: three seconds of four views are below 3 MB
 MOST_RATE = 16.0  # frames a second of a GIF
@@ -71,7 +70,7 @@ def _stored(folder: RunFolder, run: Run, scene: str) -> str:
 
 
 def write_frames(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:
-    """Write a PNG of one frame, or a GIF whose hundredths of a second add up to the right time.
+    """Write a PNG of one frame, or a GIF that takes the right time.
 
     Colours are shades of those of cloth and body. Of a rate above `MOST_RATE` every second, third or
     later frame is kept.
@@ -92,13 +91,7 @@ def write_frames(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:
     ]
     ends = [10 * round(100.0 * (k + 1) / rate) for k in range(len(drawn))]
     durations = [end - start for start, end in zip([0, *ends], ends)]
-    more: dict[str, Any] = {
-        "save_all": True,
-        "append_images": drawn[1:],
-        "duration": durations,
-        "loop": 0,
-    }
-    drawn[0].save(path, **(more if len(drawn) > 1 else {}))
+    drawn[0].save(path, save_all=True, append_images=drawn[1:], duration=durations, loop=0)
 
 
 def write_point_caches(path: Path, selected: SceneRollOuts) -> None:
@@ -117,19 +110,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         description="A film of methods side by side in a scene of a run.",
         epilog=EXAMPLES,
     )
-    parser.add_argument("run_dir", metavar="RUN", help="folder of a run that has kept its trajectories")
+    parser.add_argument("run_dir", metavar="RUN", help="folder of a run with its trajectories")
     parser.add_argument("--scene", required=True, help="as in results.csv, say tshirt/kick")
     parser.add_argument("--methods", required=True, metavar="NAME,...", help="as in results.csv")
     parser.add_argument("--seed", type=int, help="of trained methods (default: the first)")
-    parser.add_argument("--speed", type=float, default=1.0, help="less than 1 is slow motion (default 1)")
     parser.add_argument("--width", type=int, default=240, help="of a view [pixels] (default 240)")
     parser.add_argument("--azimuth", type=float, default=AZIMUTH, metavar="DEGREES",
-        help="of the camera, from the front to the body's left (default 25; 180: from behind)")  # fmt: skip
+        help="of the camera, to the body's left (default 25; 180: from behind)")  # fmt: skip
     parser.add_argument("-o", "--out", required=True, metavar="FILE", help="x.gif, x.png or x.pc2")
     options = parser.parse_args(arguments)
     path, methods = Path(options.out), [name.strip() for name in options.methods.split(",")]
-    if not 0.01 <= options.speed <= 10.0 or not 64 <= options.width <= 2000:
-        raise ValueError("--speed is 0.01 to 10, --width 64 to 2000")
+    if not 64 <= options.width <= 2000:
+        raise ValueError("--width is 64 to 2000")
     if path.suffix not in (".gif", ".png", ".pc2"):
         raise ValueError(f"{path}: a film ends in .gif, a picture in .png, point caches in .pc2")
     demand_writable_folder(path.parent)
@@ -141,7 +133,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     else:
         dt = selected.longest.dt
         with replacing(path) as temporary:
-            write_frames(temporary, images, options.speed / dt if dt > 0.0 else 1.0)
+            write_frames(temporary, images, 1.0 / dt if dt > 0.0 else 1.0)
     print(path)
     return 0
 

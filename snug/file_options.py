@@ -18,7 +18,7 @@ UNITS, AXES, REST_SHAPES = ("m", "cm", "mm", "in"), ("y", "z"), ("mesh", "uv")
 GARMENT_WORDS = """behind the path of a garment, as in shirt.obj,units=cm,up=z: units (m, cm, mm, in),
 up (y, z), shift='0 0.1 0' [m] where the body stood elsewhere, rest=uv where the UV chart is the pattern,
 uv_scale (metres per unit of the chart), material (.toml of young_modulus [Pa], poisson_ratio,
-thickness [m], density [kg/m^3], bending_stiffness [J]), weld [m] (closer vertices are one; default 1e-6)"""
+thickness [m], density [kg/m^3], bending_stiffness [J]), weld [m]: joins closer vertices"""
 # name -> role -> numbers of clips, with their sources
 SPLITS = tomllib.loads((Path(__file__).parent / "motion/splits.toml").read_text(encoding="utf-8"))
 MOTION_WORDS = f"""behind the path of motions, as in clips/,up=z: up (y, z), fps (of files that state none),
@@ -37,7 +37,7 @@ class GarmentFile:
         rest: shape without strain, "mesh" or "uv".
         uv_scale: metres per unit of the chart, by default the file's unit.
         material: a file of reference_sim.material.Material.
-        weld: distance [m] below which two vertices are one, by default the round-off of six digits.
+        weld: distance [m] below which two vertices are one.
 
     Raises:
         ValueError: a word without sense, or a file whose name cannot name scenes and networks.

@@ -96,7 +96,7 @@ class Study:
         split: which motions are measured: test, or validation, to choose recipes by.
         body: your own body of SMPL's family, .npz or .pkl; garments are made for it.
         garment: your own garment (OBJ, PLY), made for the body, in place of the T-shirt; or a table:
-            path, units, up, shift, rest, uv_scale, material.
+            path, units, up, shift, rest, uv_scale, material, weld.
         self_contact: whether the cloth of simulations is kept from crossing itself (needs ipctk).
         trained: networks of the package (true), or of the run in a folder, in place of training; methods
             whose network is not there are skipped, those of your own files trained.

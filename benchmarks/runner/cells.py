@@ -117,10 +117,9 @@ def compute_cell(cell: Cell, least: float, context: Context) -> Outcome:
     if quasi_static is not None:
         if wrong := misshapen(quasi_static.positions, scene):
             raise ValueError(f"quasi_static() {wrong}")
-        if (quasi_static.positions == trajectory.positions).all():  # one file serves for both
-            paths.append(paths[0])
-        else:
-            paths.append(folder.quasi_static_path(*cell.key))
+        same = (quasi_static.positions == trajectory.positions).all()  # one file serves for both
+        paths.append(paths[0] if same else folder.quasi_static_path(*cell.key))
+        if not same:
             quasi_static.save(paths[1])
     context.memo["method"] = method
     return Outcome(status, reason, result=result, files=tuple(map(folder.relative, paths)))

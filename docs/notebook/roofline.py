@@ -57,7 +57,7 @@ def main():
     motions = embedded_motions(TRAIN[:1])
     skinned = {
         motion.name: dressed.skinned(motion) for motion in motions
-    }  # for networks that learn vertices
+    }  # for those that learn vertices
     square = np.ones((1024, 1024), np.float32)
     operations = 2 * 1024**3 / least(lambda: square @ square)  # a second
     print(f"{dressed.vertices} vertices; {operations / 1e9:.0f} GFLOP/s")

@@ -69,9 +69,7 @@ def njit(**options: Any) -> Callable[[Any], Any]:
         finally:
             _config.CACHE_LOCATOR_CLASSES = given
         if folder:
-            kernel.compile = _one_process_at_a_time(
-                kernel.compile, folder / f"{function.__qualname__}.lock"
-            )
+            kernel.compile = _alone(kernel.compile, folder / f"{function.__qualname__}.lock")
         return kernel
 
     return decorate
@@ -93,11 +91,11 @@ class KernelLocator(InTreeCacheLocator):
         return _digests[self._module]
 
 
-def _one_process_at_a_time(compile_kernel: Callable[[Any], Any], lock: Path) -> Callable[[Any], Any]:
-    """Return the compilation of a kernel, for which other processes wait, to find it on disk then."""
+def _alone(compile_kernel: Callable[[Any], Any], lock: Path) -> Callable[[Any], Any]:
+    """Return the compilation of a kernel, for which other processes wait."""
 
     def compile_alone(signature: Any) -> Any:
-        with FileLock(lock):  # a new one each time: none can be taken into a process that is forked
+        with FileLock(lock):  # a new one each time: a fork would keep it
             return compile_kernel(signature)
 
     return compile_alone
