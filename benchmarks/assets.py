@@ -79,8 +79,8 @@ def read_inputs(
     if garment is not None:
         from snug.garments.reading import read_garment  # it loads libraries of meshes
 
-        worn = Read(garment.path, read_garment(garment, inputs.wearer), garment.name)
-        inputs = replace(inputs, garment=worn)
+        content = read_garment(garment, inputs.wearer)
+        inputs = replace(inputs, garment=Read(garment.path, content, garment.name))
     return inputs
 
 
@@ -158,21 +158,22 @@ def open_assets(
     >>> assets = open_assets(find_preset("smoke"), embedded_motions(["walk"]), ["tshirt"])  # doctest: +SKIP
     """
     inputs = inputs or Inputs()
-    wearer, worn, tailored = inputs.wearer, inputs.garment, {}
-    at_hand = {**(ready or {}), **({worn.name: worn.content} if worn else {})}
+    wearer, file = inputs.wearer, inputs.garment
+    tailored = {}
+    at_hand = {**(ready or {}), **({file.name: file.content} if file else {})}
     for name in garments:
         if (garment := at_hand.get(name)) is None:
             from snug.garments.templates import find_template  # loads libraries of meshes
 
             garment = find_template(name).tailor(wearer, vertices=preset.garment_vertices)
         tailored[name] = garment
-    longest = {True: preset.train_frames, False: preset.frames}
-    whole = [motion.cut(0, longest[motion.name in training]) for motion in motions]
+    lengths = {True: preset.train_frames, False: preset.frames}
+    cuts = [motion.cut(0, lengths[motion.name in training]) for motion in motions]
     clips = {
         motion.name: liveliest_part(wearer, motion, preset.clip_frames, preset.warm_up_frames)
-        for motion in whole
+        for motion in cuts
     }
-    return Assets(wearer, tailored, {motion.name: motion for motion in whole}, clips)
+    return Assets(wearer, tailored, {motion.name: motion for motion in cuts}, clips)
 
 
 def embedded_motions(names: Iterable[str]) -> list[Motion]:

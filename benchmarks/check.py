@@ -72,22 +72,23 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
     one_thread()
     parser = Parser(prog=f"python -m {PROGRAM}", description=DESCRIPTION, epilog=EXAMPLES)
-    parser.add_argument("what", nargs="+", metavar="FILE", help="a file")
+    parser.add_argument("files", nargs="+", metavar="FILE", help="a file")
     parser.add_argument("--scene", metavar="SCENE", dest="scenes", action="append", default=[],
         help="check the methods in this scene of benchmarks.run --list, in place of the tiny ones: for "
         "networks that are bound to a garment or a mesh")  # fmt: skip
     add_study_options(parser)
-    options, wrong = parser.parse_args(arguments), 0
+    options = parser.parse_args(arguments)
+    faults = 0
     study = study_of(options)
     study = study if study.scenes else replace(study, sizes=SIZES)
     with tempfile.TemporaryDirectory() as folder:
-        plans = [plan_of(path, study, Path(folder) / str(n)) for n, path in enumerate(options.what)]
+        plans = [plan_of(path, study, Path(folder) / str(n)) for n, path in enumerate(options.files)]
         for plan in plans:
             for name, fault in faults_of(plan):
                 print(f"{name}: wrong\n  {fault}" if fault else f"{name}: fine", flush=True)
-                wrong += bool(fault)
-    print("nothing is wrong" if not wrong else f"{wrong} to mend")
-    return 1 if wrong else 0
+                faults += bool(fault)
+    print("nothing is wrong" if not faults else f"{faults} to mend")
+    return 1 if faults else 0
 
 
 def plan_of(path: str, study: Study, folder: Path) -> Plan:
@@ -97,12 +98,10 @@ def plan_of(path: str, study: Study, folder: Path) -> Plan:
     ValueError where a run with the file would raise too, and for a file that declares nothing.
     """
     module = user_files.import_file(user_files.file_of(path))
-    wanted = user_files.KINDS[:1] if study.scenes else user_files.KINDS
-    declared = [kind.word for kind in wanted if hasattr(module, kind.tuple_name)]
+    kinds = user_files.KINDS[:1] if study.scenes else user_files.KINDS
+    declared = [kind.word for kind in kinds if hasattr(module, kind.tuple_name)]
     if not declared:
-        raise DeclarationError(
-            f"{path}: declares none of {', '.join(kind.tuple_name for kind in wanted)}"
-        )
+        raise DeclarationError(f"{path}: declares none of {', '.join(kind.tuple_name for kind in kinds)}")
     simulation = ("simulation",)
     parts = {
         "methods": Part(question="?", scenes=study.scenes or SCENES_OF_METHODS, methods=(path,)),
@@ -134,11 +133,11 @@ def faults_of(plan: Plan) -> Iterator[tuple[str, str]]:
         reasons = (o.reason for o in outcomes if o.failed or o.status == "failed")
         fault = next(reasons, "").removeprefix(f"{ContractError.__name__}: ")
         own_scene = cell.scene.declared_in and not cell.entry.declared_in
-        what = cell.method if cell.entry.declared_in else "".join(plan.metrics)
-        yield cell.scene.name if own_scene else f"{what} in {cell.scene.name}", fault
+        name = cell.method if cell.entry.declared_in else "".join(plan.metrics)
+        yield cell.scene.name if own_scene else f"{name} in {cell.scene.name}", fault
 
 
-def run_checked(cell: Cell, least: float, context: Context, needed: Needed) -> Outcome:
+def run_checked(cell: Cell, min_time: float, context: Context, needed: Needed) -> Outcome:
     """Run a cell, and check what a user's scene and method do.
 
     Raises ContractError, for what a user's code raises with file and line.
@@ -147,15 +146,15 @@ def run_checked(cell: Cell, least: float, context: Context, needed: Needed) -> O
     try:
         if cell.scene.declared_in:
             check_scene(cell.scene, context.assets)
-        outcome = compute_cell(cell, least, context)
+        outcome = compute_cell(cell, min_time, context)
         if entry.declared_in and not outcome.failed:
             scene = build_scene(cell.scene, context)
             check_method(entry, scene, partial(entry.make, models=models), cell.seed)
     except (ContractError, RunStopped):
         raise
     except Exception as error:
-        where = raised_at(error, entry.declared_in or cell.scene.declared_in)
-        raise ContractError(f"{one_line(error)}{f' ({where})' if where else ''}") from None
+        place = raised_at(error, entry.declared_in or cell.scene.declared_in)
+        raise ContractError(f"{one_line(error)}{f' ({place})' if place else ''}") from None
     return outcome
 
 
@@ -173,15 +172,15 @@ class ContractError(RuntimeError):
 
 
 def demand(*claims: tuple[object, str]) -> None:
-    """Raise ContractError with the texts of all claims that are false."""
-    if wrong := [text for true, text in claims if not true]:
-        raise ContractError("; ".join(wrong))
+    """Raise ContractError with the texts of the false claims."""
+    if faults := [text for true, text in claims if not true]:
+        raise ContractError("; ".join(faults))
 
 
 def check_method(entry: MethodEntry, scene: BuiltScene, make: Callable[..., Method], seed: int) -> None:
     """Run a method twice with a seed, and with another one, and check what it has done.
 
-    make(seed=seed) returns a new method. Raises ContractError with the demands that are not met.
+    make(seed=seed) returns a new method. Raises ContractError with the demands not met.
     """
     before = fingerprints(scene)
 
@@ -192,15 +191,15 @@ def check_method(entry: MethodEntry, scene: BuiltScene, make: Callable[..., Meth
         return method.run(), time.perf_counter() - clock
 
     answer, seconds = run(seed)
-    x, stated = np.asarray(answer.positions, np.float64), float(np.nansum(answer.frame_seconds))
+    x, claim = np.asarray(answer.positions, np.float64), float(np.nansum(answer.frame_seconds))
     whole = len(x) == scene.frames or answer.status == "diverged"
     demand((whole, f"gives {len(x)} of {scene.frames} frames"))
     bad = np.flatnonzero(~np.isfinite(x).all(axis=(1, 2)))
-    changed = [name for name, text in fingerprints(scene).items() if before.get(name) != text]
-    near = PLACE_TOLERANCE * max(1.0, np.abs(scene.start).max())
-    pin = "" if entry.other_mesh else loose_pin(x, scene, near)
+    changes = [name for name, text in fingerprints(scene).items() if before.get(name) != text]
+    limit = PLACE_TOLERANCE * max(1.0, np.abs(scene.start).max())
+    pin = "" if entry.other_mesh else loose_pin(x, scene, limit)
     demand(
-        (entry.gives_first_frame or entry.other_mesh or distance(x[0], scene.start) <= near,
+        (entry.gives_first_frame or entry.other_mesh or distance(x[0], scene.start) <= limit,
             "frame 0 is off the scene's start: put scene.start there, or say gives_first_frame=True"),
         (not pin, f"a pin is off its place in {pin}: "
             "x[cloth.pins] = scene.pin_positions(frame), or the start where that is None"),
@@ -210,24 +209,24 @@ def check_method(entry: MethodEntry, scene: BuiltScene, make: Callable[..., Meth
             "gives other times than np.arange(frames) * scene.dt"),
         (not len(bad) or (answer.status == "diverged" and answer.reason), "has a position that is not finite "
             f"in frame {bad.min(initial=len(x))}: say status='diverged', and why"),
-        (stated <= CLOCK_SLACK * seconds + PLACE_TOLERANCE, f"its frames say {stated:.3g} s in all, the "
+        (claim <= CLOCK_SLACK * seconds + PLACE_TOLERANCE, f"its frames say {claim:.3g} s in all, the "
             f"clock {seconds:.3g} s: give frame_seconds in seconds, of run() alone"),
-        (not changed, f"alters the scene: {', '.join(changed)}: copy what you change, others read it"),
+        (not changes, f"alters the scene: {', '.join(changes)}: copy what you change, others read it"),
     )  # fmt: skip
-    again = distance(x, run(seed)[0].positions)
-    demand((again == 0.0, f"a second run gives other positions, by {again:.3g} m: draw all that is random "
+    gap = distance(x, run(seed)[0].positions)
+    demand((gap == 0.0, f"a second run gives other positions, by {gap:.3g} m: draw all that is random "
         "from `seed`, keep nothing between objects"))  # fmt: skip
     if not entry.seeded and entry.trained is None:
-        other = distance(x, run(seed + 1)[0].positions)
-        demand((other == 0.0, f"another seed gives other positions, by {other:.3g} m: say seeded=True"))
+        gap = distance(x, run(seed + 1)[0].positions)
+        demand((gap == 0.0, f"another seed gives other positions, by {gap:.3g} m: say seeded=True"))
 
 
-def loose_pin(x: np.ndarray, scene: BuiltScene, near: float) -> str:
-    """Return the first frame of positions x (T,V,3) [m] in which a pin is farther than `near` off; or ""."""
+def loose_pin(x: np.ndarray, scene: BuiltScene, limit: float) -> str:
+    """Return the first frame of positions x (T,V,3) [m] in which a pin is farther than `limit` off; or ""."""
     pins = scene.cloth.pins
     for frame in range(1, len(x)) if scene.dressed is None and len(pins) else ():
         place = scene.pin_positions(frame) if scene.pin_positions else scene.start[pins]
-        if distance(x[frame][pins], np.asarray(place)) > near:
+        if distance(x[frame][pins], np.asarray(place)) > limit:
             return f"frame {frame}"
     return ""
 
@@ -239,18 +238,18 @@ def distance(one: np.ndarray, other: np.ndarray) -> float:
 
 def fingerprints(scene: BuiltScene) -> dict[str, str]:
     """Return name -> digest of the arrays of a scene, which nobody may alter."""
-    whole: Any = scene
+    root: Any = scene
     values = {
-        name: reduce(lambda of, a: getattr(of, a, None), name.split("."), whole) for name in UNALTERED
+        name: reduce(lambda part, a: getattr(part, a, None), name.split("."), root) for name in UNALTERED
     }
     return {name: digest(np.asarray(value)) for name, value in values.items() if value is not None}
 
 
 def check_scene(scene: Scene, assets: Assets | None) -> None:
     """Build a scene twice and check it. Raises ContractError, and whatever building it raises."""
-    built, again = (scene.build(assets) for _ in range(2))
-    before, after = fingerprints(built), fingerprints(again)
-    changed = [name for name in before if after.get(name) != before[name]]
+    built, twin = (scene.build(assets) for _ in range(2))
+    before, after = fingerprints(built), fingerprints(twin)
+    changes = [name for name in before if after.get(name) != before[name]]
     demand(
         (built.name == scene.name, f"is built as '{built.name}': give name=scene.name"),
         (built.frames >= FEWEST_FRAMES, f"has {built.frames} frames: {FEWEST_FRAMES} are needed"),
@@ -260,12 +259,12 @@ def check_scene(scene: Scene, assets: Assets | None) -> None:
             "builds an obstacle and declares none, or the reverse: say obstacle=True where it has one"),
         ((built.dressed is not None) == scene.dressed,
             "is built dressed and names no garment, or the reverse: say garment= and motion= where it is"),
-        (not changed, f"is built otherwise the second time: {', '.join(changed)}: draw all that is random "
+        (not changes, f"is built otherwise the second time: {', '.join(changes)}: draw all that is random "
             "from a fixed seed"),
     )  # fmt: skip
-    for energy in again.energies:
+    for energy in twin.energies:
         if not type(energy).__module__.startswith("reference_sim."):
-            check_derivatives(energy, again)
+            check_derivatives(energy, twin)
 
 
 def check_derivatives(energy: Energy, scene: BuiltScene) -> None:
@@ -277,16 +276,16 @@ def check_derivatives(energy: Energy, scene: BuiltScene) -> None:
     x = scene.start + scale * random.standard_normal(scene.start.shape)
     energy.prepare(Step(scene.start, scene.start_velocity, x, scene.dt, scene.obstacle, 1))
     value, gradient = energy.value_and_gradient(x)
-    what = f"energy {energy.name}: its"
+    label = f"energy {energy.name}: its"
     finite = np.isfinite(value) and np.shape(gradient) == x.shape and np.isfinite(gradient).all()
     demand(
-        (finite, f"{what} value {value} and gradient {np.shape(gradient)}: give finite ones {x.shape}")
+        (finite, f"{label} value {value} and gradient {np.shape(gradient)}: give finite ones {x.shape}")
     )
-    for kind, of in zip(DIFFERENTIATED, ("value", "gradient")):
-        off, size = off_by(energy, x, scale * random.standard_normal(x.shape), kind)
-        near = DERIVATIVE_TOLERANCE * size + SUM_ROUND_OFF * max(abs(value), size) / STEP
-        demand((off <= near, f"{what} {kind} is not the derivative of its {of}: off by {off:.3g} of "
-            f"{size:.3g}: mend it, or leave it to automatic differentiation"))  # fmt: skip
+    for kind, source in zip(DIFFERENTIATED, ("value", "gradient")):
+        error, size = off_by(energy, x, scale * random.standard_normal(x.shape), kind)
+        limit = DERIVATIVE_TOLERANCE * size + SUM_ROUND_OFF * max(abs(value), size) / STEP
+        demand((error <= limit, f"{label} {kind} is not the derivative of its {source}: off by {error:.3g} "
+            f"of {size:.3g}: mend it, or leave it to automatic differentiation"))  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -41,16 +41,16 @@ def attributes_of(kind: type) -> dict[str, str]:
     return {names: " ".join(content.split()).rstrip(".") for names, content in entries}
 
 
-def by_name(what: str, entries: Iterable[Entry]) -> dict[str, Entry]:
+def by_name(kind: str, entries: Iterable[Entry]) -> dict[str, Entry]:
     """Return name -> entry, in their order. Raises DeclarationError where two have one name."""
-    known: dict[str, Entry] = {}
+    index: dict[str, Entry] = {}
     for entry in entries:
-        if entry.name in known:
-            both = (known[entry.name], entry)
+        if entry.name in index:
+            both = (index[entry.name], entry)
             homes = " and by ".join(getattr(e, "declared_in", "") or "the project itself" for e in both)
-            raise DeclarationError(f"{what} '{entry.name}' is declared twice, by {homes}: rename one")
-        known[entry.name] = entry
-    return known
+            raise DeclarationError(f"{kind} '{entry.name}' is declared twice, by {homes}: rename one")
+        index[entry.name] = entry
+    return index
 
 
 def load(module: str) -> ModuleType:

@@ -1,4 +1,4 @@
-"""Evaluate a few methods in this process, beside references that are shipped or simulated now.
+"""Evaluate a few methods in this process, beside references shipped or simulated now.
 
 The tasks are those of a run (benchmarks.runner) without its processes, cache, clock and report.
 """
@@ -43,28 +43,28 @@ def evaluate(plan: Plan, references: Mapping[str, Reference] | None = None) -> R
 
     Args:
         plan: cells of SNUG and PBNS count only in scenes with a reference: they are the package's.
-        references: scene -> what takes the place of its simulation; None: those that are shipped.
+        references: scene -> what takes the place of its simulation; None: those shipped.
 
     Raises:
         RollOutFileError: a roll-out that does not belong to its scene; then nothing is written.
     """
-    assets, found = assets_of(plan), dict(references or {})
+    assets, by_scene = assets_of(plan), dict(references or {})
     folder = RunFolder(plan.folder)
     contexts = {s.name: Context(folder, assets, {"scene": s.build(assets)}) for s in plan.scenes}
-    at_hand = [cell for cell in plan.cells if cell.entry.role == "reference" and runs(cell)]
-    simulated = {cell.scene for cell in at_hand if cell.entry.module != MODULE}
+    sources = [cell for cell in plan.cells if cell.entry.role == "reference" and runs(cell)]
+    simulated = {cell.scene for cell in sources if cell.entry.module != MODULE}
     notes = []
     for scene in plan.scenes if references is None else ():
         shipped = find_reference(scene, plan, contexts[scene.name].memo["scene"])
         if isinstance(shipped, str):
             notes += [f"{shipped}: it is simulated, which takes minutes"] * (scene in simulated)
             continue
-        found[scene.name] = shipped
+        by_scene[scene.name] = shipped
         if any(digest_of_file(packaged_network(name)) != at for name, at in shipped.networks.items()):
             notes.append(OLDER)
-    kept = (c for c in plan.cells if c.method not in TRAINED or c.scene.name in found)
-    plan = replace(plan, cells=tuple(replace(c, entry=replace(c.entry, timed=False)) for c in kept))
-    for name, reference in found.items():
+    cells = (c for c in plan.cells if c.method not in TRAINED or c.scene.name in by_scene)
+    plan = replace(plan, cells=tuple(replace(c, entry=replace(c.entry, timed=False)) for c in cells))
+    for name, reference in by_scene.items():
         memo, start = contexts[name].memo, reference.positions[0]
         memo["scene"] = replace(memo["scene"], settle=lambda start=start: start)
     for cell in plan.cells:
@@ -75,7 +75,7 @@ def evaluate(plan: Plan, references: Mapping[str, Reference] | None = None) -> R
     if assets:
         log.open_assets(assets)
     for scene in plan.scenes:
-        outcomes |= _of_scene(scene, plan, contexts[scene.name], found.get(scene.name))
+        outcomes |= _of_scene(scene, plan, contexts[scene.name], by_scene.get(scene.name))
     log.config["finished"] = now()
     outcomes = {id: replace(o, origin=log.origin | o.origin) for id, o in outcomes.items()}
     log.write_rows(rows_of(plan, (), outcomes))
@@ -99,13 +99,13 @@ def _of_scene(
     """Return the outcomes of a scene's cells and of their metrics."""
     cells = tuple(cell for cell in plan.cells if cell.scene == scene)
     outcomes, measured = dict[TaskId, Outcome](), dict[TaskId, Outcome]()
-    known = reference.metrics if reference else {}
+    metrics = reference.metrics if reference else {}
     for cell in cells:
-        if (why := cell.entry.skip(scene)) is not None:
-            outcomes[cell.id()] = Outcome("skipped", why)
+        if (reason := cell.entry.skip(scene)) is not None:
+            outcomes[cell.id()] = Outcome("skipped", reason)
         elif reference and cell.entry.role == "reference":
             outcomes[cell.id()] = _saved(reference, cell, context)
-        elif cell.method not in known:
+        elif cell.method not in metrics:
             if cell.entry.trained in TRAINED:
                 models = context.folder.models_of(scene.garment)
                 models.mkdir(parents=True, exist_ok=True)
@@ -118,10 +118,10 @@ def _of_scene(
         outcomes[id] = Outcome() if reference else simulate_quasi_static(scene, context, {})
     context.memo["roll-outs"] = roll_outs_of(cells, plan.study.sizes.gap_samples, context, outcomes)
     for cell in cells:
-        if reference and cell.method in known:
+        if reference and cell.method in metrics:
             usual = Outcome(files=(cell.name,), result={"terms": "+".join(context.memo["scene"].terms)})
             outcomes[cell.id()] = replace(outcomes.get(cell.id(), usual), origin=dict(reference.origin))
-            measured[cell.id("metrics")] = Outcome(result=known[cell.method])
+            measured[cell.id("metrics")] = Outcome(result=metrics[cell.method])
         elif outcomes[cell.id()].files:
             with _steps_beside(context.memo["roll-outs"][cell]):
                 measured[cell.id("metrics")] = measure_cell(
@@ -133,13 +133,13 @@ def _of_scene(
 def _saved(reference: Reference, cell: Cell, context: Context) -> Outcome:
     """Write a reference into the run's folder, as if simulated there."""
     built, folder = context.memo["scene"], context.folder
-    still = np.full_like(reference.positions, np.nan)
-    still[:, built.dressed.garment.hem] = reference.hem
+    static = np.full_like(reference.positions, np.nan)
+    static[:, built.dressed.garment.hem] = reference.hem
     path = folder.trajectory_path(*cell.key)
-    times = np.arange(len(still)) * built.dt
+    times = np.arange(len(static)) * built.dt
     for positions, to in (
         (reference.positions, path),
-        (still, folder.quasi_static_path(cell.scene.name)),
+        (static, folder.quasi_static_path(cell.scene.name)),
     ):
         Trajectory(positions, built.cloth.faces, times, status="converged").save(to)
     facts = {"terms": "+".join(built.terms)}

@@ -75,9 +75,9 @@ def icosphere(subdivisions: int, radius: float) -> tuple[np.ndarray, np.ndarray]
     golden = (1 + 5**0.5) / 2
     corners = [(0.0, s, t * golden) for s in (-1, 1) for t in (-1, 1)]
     points = np.array([np.roll(corner, k) for k in range(3) for corner in corners])
-    near = np.isclose(np.linalg.norm(points[:, None] - points[None], axis=2), 2.0)
+    edges = np.isclose(np.linalg.norm(points[:, None] - points[None], axis=2), 2.0)
     i, j, k = np.meshgrid(*[np.arange(12)] * 3, indexing="ij")
-    faces = np.argwhere((i < j) & (i < k) & near[i, j] & near[j, k] & near[k, i])
+    faces = np.argwhere((i < j) & (i < k) & edges[i, j] & edges[j, k] & edges[k, i])
     faces = faces[np.linalg.det(points[faces]) > 0]
     for _ in range(subdivisions):
         unique, inverse = np.unique(np.sort(half_edges(faces), axis=1), axis=0, return_inverse=True)
@@ -111,8 +111,8 @@ def torus(cells: int, major: float, minor: float) -> tuple[np.ndarray, np.ndarra
     ring = major + minor * np.cos(v)
     points = np.stack([ring * np.cos(u), minor * np.sin(v), ring * np.sin(u)], -1).reshape(-1, 3)
     i, j = np.meshgrid(np.arange(2 * cells), np.arange(cells), indexing="ij")
-    after, beside = (i + 1) % (2 * cells), (j + 1) % cells
-    a, b, c, d = (p * cells + q for p, q in ((i, j), (after, j), (after, beside), (i, beside)))
+    i_next, j_next = (i + 1) % (2 * cells), (j + 1) % cells
+    a, b, c, d = (p * cells + q for p, q in ((i, j), (i_next, j), (i_next, j_next), (i, j_next)))
     faces = np.concatenate(
         [np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)]
     )

@@ -46,7 +46,7 @@ class Training:
         kind: one of snug.kinds.KINDS.
         recipe: options of network and training.
         simulated: simulations that it learns from; None if it learns from the energies alone.
-        packaged: name of the network that is taken from the package in place of this training; empty: it
+        packaged: name of the network taken from the package in place of this training; empty: it
             is trained.
     """
 
@@ -88,7 +88,7 @@ class Method:
     def run(self) -> Trajectory:
         """Compute the roll-out, frame by frame. Timed. Failure is a status in it, not an exception.
 
-        Short ones are called again until enough time is measured: each does all of the work, from the
+        Short ones are called again until enough time is measured: each does all the work, from the
         start.
         """
         raise NotImplementedError
@@ -108,7 +108,7 @@ class Method:
     def batch(self, copies: int) -> Callable[[], np.ndarray]:
         """Return a function that computes so many bodies at once when called, (T, copies, V, 3) [m].
 
-        That call is timed. Asked only of methods that are declared `batched`.
+        That call is timed. Asked only of methods declared `batched`.
         """
         raise NotImplementedError
 
@@ -134,7 +134,7 @@ class Reporting:
             empty.
         level: place on that curve, as a number of iterations or a tolerance.
         base: name of the method that this one is compared with.
-        pairing_group: shared by methods that are compared seed by seed.
+        pairing_group: shared by methods compared seed by seed.
     """
 
     family: str = ""

@@ -109,7 +109,7 @@ def metrics_of(*rows: tuple[Any, ...], **shared: Any) -> tuple[Metric, ...]:
 
 @dataclass(frozen=True)
 class Measurements:
-    """Metrics that are measured together.
+    """Metrics measured together.
 
     Attributes:
         name: in the `metrics` of a scene; the path of a user's file.
@@ -211,7 +211,7 @@ class RollOut(Kept):
 
 @dataclass(eq=False)
 class SceneRollOuts(Kept):
-    """Roll-outs of one scene that are measured together: they share its search trees.
+    """Roll-outs of one scene measured together: they share its search trees.
 
     Attributes:
         scene: as it was built.

@@ -85,7 +85,7 @@ def find_preset(name: str) -> Preset:
     >>> find_preset("smoke").garment_vertices
     350
     """
-    known = {preset.name: preset for preset in PRESETS}
-    if name not in known:
-        raise ValueError(f"unknown preset '{name}'; choose from {', '.join(known)}")
-    return known[name]
+    presets = {preset.name: preset for preset in PRESETS}
+    if name not in presets:
+        raise ValueError(f"unknown preset '{name}'; choose from {', '.join(presets)}")
+    return presets[name]

@@ -42,9 +42,9 @@ def commit() -> str:
     So all runs between two changes of the code name one commit, whatever is committed besides.
     """
 
-    def git(*words: str) -> str:
+    def git(*options: str) -> str:
         # No lock on the index: one would stay there where the disk is full.
-        command = ["git", "--no-optional-locks", "-C", str(ROOT), *words, "--", *CODE]
+        command = ["git", "--no-optional-locks", "-C", str(ROOT), *options, "--", *CODE]
         return subprocess.run(command, capture_output=True, text=True, timeout=20, check=True).stdout
 
     # No git here: the installed version is what is known.
@@ -77,10 +77,10 @@ def processor_name() -> str:
         name.strip(): " ".join(value.split()) for name, _, value in (s.partition(":") for s in lines)
     }
     name = facts.get("model name") or platform.processor() or platform.machine()
-    which = [
+    details = [
         f"{key.split()[-1]} {facts[key]}" for key in ("cpu family", "model", "stepping") if key in facts
     ]
-    return f"{name} ({', '.join(which)})" if which else name
+    return f"{name} ({', '.join(details)})" if details else name
 
 
 def usable_cores() -> int:
@@ -131,9 +131,9 @@ def digest(value: Any) -> str:
 
 def _plain(value: Any) -> Any:
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
-        known = {f: getattr(value, f.name) for f in dataclasses.fields(value)}
+        values = {f: getattr(value, f.name) for f in dataclasses.fields(value)}
         # An option added later changes no digest where it is not used.
-        return {f.name: v for f, v in known.items() if not (f.metadata.get("added") and v == f.default)}
+        return {f.name: v for f, v in values.items() if not (f.metadata.get("added") and v == f.default)}
     if hasattr(value, "tobytes"):  # an array
         return [str(value.dtype), list(value.shape), digest(value.tobytes())]
     if isinstance(value, set | frozenset):

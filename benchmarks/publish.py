@@ -62,8 +62,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         "-o", "--out", metavar="DIR", default=WORK, type=Path, help=f"where the runs lie (default {WORK})"
     )
     options = parser.parse_args(arguments)
-    known = [name for name in study_names() if read_study(name).show]
-    head, failed = commit(), 0
+    studies = [name for name in study_names() if read_study(name).show]
+    head = commit()
+    failed = 0
     if options.studies == [REFERENCES]:
         from benchmarks.references import VERTICES, write_garment
         from snug import Body, find_template  # loads libraries of meshes
@@ -72,9 +73,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for motion in TEST:
             print(make_reference(f"tshirt/{motion}", options.out / REFERENCES), flush=True)
         return 0
-    names = options.studies or known
-    if silent := [name for name in names if not read_study(name).show]:
-        raise StudyError(f"study {silent[0]}: has no [show]: the studies {', '.join(known)} do")
+    names = options.studies or studies
+    if unshown := [name for name in names if not read_study(name).show]:
+        raise StudyError(f"study {unshown[0]}: has no [show]: the studies {', '.join(studies)} do")
     if head.endswith("+changes"):
         raise StudyError(f"{head}: commit the changes first, so that a commit says what was run")
     plans = {name: make_plan(with_seeds(name), folder=options.out / Path(name).stem) for name in names}
@@ -124,12 +125,12 @@ def make_reference(name: str, out: Path) -> Path:
     networks = {
         method: digest_of_file(references.packaged_network(method)) for method in references.TRAINED
     }
-    known = replace(reference, metrics=metrics, origin=log.origin, networks=networks)
-    return references.write_reference(scene, plan, known, built)
+    reference = replace(reference, metrics=metrics, origin=log.origin, networks=networks)
+    return references.write_reference(scene, plan, reference, built)
 
 
 def with_seeds(name: str) -> Study:
-    """Return a study with the seeds that are published of it."""
+    """Return a study with the seeds published of it."""
     study = read_study(name)
     seeds = study.show.seeds if study.show else ()
     return read_study(name, [option("seeds", [*seeds])]) if seeds else study
@@ -157,12 +158,12 @@ def publish(name: str, out: Path, into: Path, head: str) -> None:
     if not all_usable(RunFolder(whole)):
         raise ResultsError(f"{whole}: has failed")
     if others := sorted({row.commit for row in RunFolder(whole).read_rows()} - {head, ""}):
-        found = f"{whole}: rows of commit {', '.join(others)}"
-        raise ResultsError(f"{found}; remove the folder, or check that commit out")
-    for film, wanted in show.films.items():
+        fault = f"{whole}: rows of commit {', '.join(others)}"
+        raise ResultsError(f"{fault}; remove the folder, or check that commit out")
+    for film, options in show.films.items():
         path = whole / "figures" / film
         path.unlink(missing_ok=True)
-        _call("reports.film", str(whole), *shlex.split(wanted), "-o", str(path))
+        _call("reports.film", str(whole), *shlex.split(options), "-o", str(path))
     keep(whole, into / whole.name, show)
     print(f"{name}: published in {into / whole.name}", flush=True)
 
@@ -191,15 +192,15 @@ def keep(whole: Path, target: Path, show: Show) -> None:
     Raises ResultsError where a picture, film or network of `show` is not there.
     """
     networks = [model_path(RunFolder(whole).models, name, seed=0) for name in show.networks]
-    kept = [whole / name for name in KEPT] + [whole / "figures" / name for name in show.files]
+    files = [whole / name for name in KEPT] + [whole / "figures" / name for name in show.files]
     tables = [path for path in (whole / "tables").glob("*.csv") if not path.match("*_by_scene.csv")]
     packed = [path for name in PACKED if (path := whole / name).exists() or name == PACKED[0]]
-    if missing := [path for path in (*kept, *packed, *networks) if not path.exists()]:
+    if missing := [path for path in (*files, *packed, *networks) if not path.exists()]:
         raise ResultsError(f"{missing[0]}: not there, and the study publishes it")
-    fresh = target.with_name(f"{target.name}.new")
-    shutil.rmtree(fresh, ignore_errors=True)
-    with new_folder(fresh) as part:
-        for path in kept:
+    draft = target.with_name(f"{target.name}.new")
+    shutil.rmtree(draft, ignore_errors=True)
+    with new_folder(draft) as part:
+        for path in files:
             shutil.copy(path, part)
         for path in packed:  # of one time, so that equal files have equal copies
             (part / f"{path.name}.gz").write_bytes(gzip.compress(path.read_bytes(), mtime=0))
@@ -209,7 +210,7 @@ def keep(whole: Path, target: Path, show: Show) -> None:
         for path in networks:
             save_half(path, part / path.relative_to(whole))
     shutil.rmtree(target, ignore_errors=True)
-    fresh.rename(target)
+    draft.rename(target)
 
 
 def save_half(model: Path, copy: Path) -> None:

@@ -1,4 +1,4 @@
-"""References that are shipped: a scene of the T-shirt's test motions is scored without being simulated.
+"""Shipped references: a scene of the T-shirt's test motions is scored without being simulated.
 
 A file has the simulation to four micrometres, its quasi-static solution at the hem, and the metrics of
 simulation, skinning, SNUG and PBNS. It serves a scene whose declaration, sizes and protocol are those that
@@ -55,7 +55,7 @@ class Reference:
         status, reason: how the simulation ended.
         metrics: method -> metric -> number.
         origin: commit, preset and hardware of the numbers.
-        networks: method -> digest of the network that was measured.
+        networks: method -> digest of the measured network.
     """
 
     positions: Positions
@@ -107,8 +107,8 @@ def motion_of(built: BuiltScene) -> Floats:
 def find_reference(scene: Scene, plan: Plan, built: BuiltScene) -> Reference | str:
     """Return the reference of a scene of a plan, or why none is shipped."""
     path = FOLDER / f"{flat(scene.name)}.npz"
-    own = any(protocol_of(cell, plan) == OWN for cell in plan.cells if cell.scene == scene)
-    if own or not path.is_file():
+    is_own = any(protocol_of(cell, plan) == OWN for cell in plan.cells if cell.scene == scene)
+    if is_own or not path.is_file():
         return "none is shipped for this scene, garment, body, motion and sizes"
     arrays = read_arrays(path)
     facts = json.loads(str(arrays.pop("facts")))
@@ -116,12 +116,12 @@ def find_reference(scene: Scene, plan: Plan, built: BuiltScene) -> Reference | s
     same = moved.shape == motion.shape and np.allclose(moved, motion, rtol=0.0, atol=SAME)
     if facts.pop("key") != key_of(scene, plan, built) or not same:
         return f"{path.name} is of another scene, motion or protocol"
-    moves, hem = (_unpacked(arrays[name]) for name in ("positions", "hem"))
+    moves, hem_moves = (_unpacked(arrays[name]) for name in ("positions", "hem"))
     order, parents = _tree(built.cloth.faces)
     for vertex in order[1:]:
         moves[:, vertex] += moves[:, parents[vertex]]
-    positions, still = (STEP * x.cumsum(axis=0).cumsum(axis=0) for x in (moves, hem))
-    return Reference(positions, still, **facts)
+    positions, hem = (STEP * x.cumsum(axis=0).cumsum(axis=0) for x in (moves, hem_moves))
+    return Reference(positions, hem, **facts)
 
 
 def write_reference(scene: Scene, plan: Plan, reference: Reference, built: BuiltScene) -> Path:
@@ -129,14 +129,14 @@ def write_reference(scene: Scene, plan: Plan, reference: Reference, built: Built
     rounded = (np.rint(x / STEP).astype(np.int64) for x in (reference.positions, reference.hem))
     positions, hem = (np.diff(x, n=2, axis=0, prepend=0 * x[:2]) for x in rounded)
     order, parents = _tree(built.cloth.faces)
-    beside = positions.copy()
-    beside[:, order[1:]] -= positions[:, parents[order[1:]]]
+    deltas = positions.copy()
+    deltas[:, order[1:]] -= positions[:, parents[order[1:]]]
     names = ("status", "reason", "metrics", "origin", "networks")
     facts = {"key": key_of(scene, plan, built)} | {name: getattr(reference, name) for name in names}
     path = FOLDER / f"{flat(scene.name)}.npz"
     with replacing(path) as temporary, temporary.open("wb") as stream:
         np.savez_compressed(
-            stream, positions=_packed(beside), hem=_packed(hem), facts=np.array(json.dumps(facts)),
+            stream, positions=_packed(deltas), hem=_packed(hem), facts=np.array(json.dumps(facts)),
             motion=motion_of(built).astype(np.float32),
         )  # fmt: skip
     return path

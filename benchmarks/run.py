@@ -1,7 +1,7 @@
 """python -m benchmarks.run: the main job, from a body and motions to a report.
 
 This file is the command alone: a study, its plan, an exit status. Nothing heavy is
-imported before the plan is made, so that --help and --list answer at once.
+imported before the plan is made, so --help and --list answer at once.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from benchmarks.timing import one_thread
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
     command_line = list(sys.argv[1:] if arguments is None else arguments)
-    asked = "default"
+    name = "default"
     one_thread()
     try:
         options = make_parser().parse_args(command_line)
-        asked = options.study
-        study = study_of(options, asked)
+        name = options.study
+        study = study_of(options, name)
         if options.list is not None:
             print(list_names(study, options.list))
             return 0
@@ -43,7 +43,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         )
     except (ValueError, OSError) as error:  # also the readers' own: each is one line with file and remedy
         line = " ".join(str(error).split())
-        line = located(line, asked, command_line) if isinstance(error, StudyError) else line
+        line = located(line, name, command_line) if isinstance(error, StudyError) else line
         print(f"{PROGRAM}: {line}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:

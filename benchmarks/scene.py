@@ -174,8 +174,8 @@ class BuiltScene:
         if self.warm_up < 2:
             raise ValueError(f"scene {self.name}: warm_up {self.warm_up}: give 2 frames or more")
         if not 0.0 < self.dt <= LONGEST_FRAME:
-            wanted = f"give the duration of a frame in seconds, above 0 and at most {LONGEST_FRAME:g}"
-            raise ValueError(f"scene {self.name}: dt {self.dt:g}: {wanted}")
+            remedy = f"give the duration of a frame in seconds, above 0 and at most {LONGEST_FRAME:g}"
+            raise ValueError(f"scene {self.name}: dt {self.dt:g}: {remedy}")
 
     @cached_property
     def start_state(self) -> np.ndarray:
@@ -203,9 +203,9 @@ class BuiltScene:
         from snug.networks.dressed_body import DressedBody  # loads torch
         from snug.recipe import DEFAULT
 
-        motion, kept = self.dressed.motion, self.kept
-        if kept is not None:
-            motion = replace(motion, poses=motion.poses[kept], translations=motion.translations[kept])
+        motion, frames = self.dressed.motion, self.kept
+        if frames is not None:
+            motion = replace(motion, poses=motion.poses[frames], translations=motion.translations[frames])
         dressed = DressedBody(self.dressed.body, self.dressed.garment)
         return dressed.skinned(motion, self.dressed.betas, smoothing=DEFAULT.smoothing)
 

@@ -62,9 +62,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     add = parser.add_argument
     add("roll_out", metavar="[NAME=]ROLLOUT", help="file, folder or pattern; as benchmarks.run --rollout")
-    where = parser.add_mutually_exclusive_group(required=True)
-    where.add_argument("--scene", metavar="NAME", help="as in benchmarks.run --list")
-    where.add_argument("--rest-mesh", metavar="FILE",
+    group = parser.add_mutually_exclusive_group(required=True)
+    group.add_argument("--scene", metavar="NAME", help="as in benchmarks.run --list")
+    group.add_argument("--rest-mesh", metavar="FILE",
         help="no scene of this project: the cloth at rest, in the roll-out's unit, axes and order; the file "
         "brings its own body (obstacle, obstacle_faces) and starts at rest in its first frame")  # fmt: skip
     add_study_options(parser)
@@ -92,7 +92,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def score(
-    roll_out: str | Path, scene: str = "", *, study: Study | None = None, fresh: bool = False, **more: Any
+    roll_out: str | Path, scene: str = "", *, study: Study | None = None, fresh: bool = False, **opts: Any
 ) -> dict[str, Any]:
     """Evaluate a roll-out in a scene and return its `numbers`.
 
@@ -101,7 +101,7 @@ def score(
         scene: its name, as "tshirt/kick".
         study: whose body, garment, motions and sizes the scene has; None: study full.
         fresh: whether a scene is simulated whose reference is shipped.
-        more: `rest_mesh`, `reference`, `folder` and `command_line` of `plan_score`.
+        opts: `rest_mesh`, `reference`, `folder` and `command_line` of `plan_score`.
 
     Raises:
         ValueError: one line, where the roll-out cannot be read or does not belong to the scene.
@@ -110,7 +110,7 @@ def score(
     0.031
     """
     one_thread()
-    plan = plan_score(study or read_study(), str(roll_out), scene, **more)
+    plan = plan_score(study or read_study(), str(roll_out), scene, **opts)
     from benchmarks.evaluate import evaluate  # loads the simulator
 
     return numbers(evaluate(plan, {} if fresh else None))
@@ -142,11 +142,11 @@ def plan_score(
 
         scenes = [declared(stored, str(rest_mesh))]
         scene = scenes[0].name
-    beside = MEASURED_BESIDE if rest_mesh else (*MEASURED_BESIDE, *NETWORKS)
+    methods = MEASURED_BESIDE if rest_mesh else (*MEASURED_BESIDE, *NETWORKS)
     # Some have a scene's name.
     parts = {name: replace(part, cases=()) for name, part in study.parts.items()}
     plan = make_plan(
-        replace(study, parts=parts, scenes=(scene,), methods=beside, rollouts={name: stored}),
+        replace(study, parts=parts, scenes=(scene,), methods=methods, rollouts={name: stored}),
         folder=folder, command=command_line, scenes=scenes,
     )  # fmt: skip
     if len(plan.scenes) != 1:
@@ -158,15 +158,15 @@ def plan_score(
     return replace(plan, cells=tuple(cells))
 
 
-def _reference(cell: Cell, given: str | Path | Literal[False] | None) -> Cell:
+def _reference(cell: Cell, source: str | Path | Literal[False] | None) -> Cell:
     """Return the simulation's cell, or the one that takes its place; others as they are."""
-    if cell.entry.role != "reference" or given is None:
+    if cell.entry.role != "reference" or source is None:
         return cell
-    if given is False:
+    if source is False:
         return replace(cell, entry=replace(cell.entry, left_out=NO_REFERENCE))
     from benchmarks.methods.outside import entry_of  # loads numpy
 
-    stored = RollOutOption("reference", str(given), role="reference")
+    stored = RollOutOption("reference", str(source), role="reference")
     entry = entry_of(stored, cell.scene.name)
     if entry is None:
         raise RollOutFileError(f"--reference {stored.path_for(cell.scene.name)}: no such file")
@@ -181,13 +181,13 @@ def numbers(log: RunLog) -> dict[str, Any]:
     cell = log.plan.cells[-1]
     rows = [row for row in log.rows if row.method == cell.method]
     worst = next((row for row in rows if row.status != "ok"), rows[0])
-    known = (row for row in rows if row.value is not None)
+    values = (row for row in rows if row.value is not None)
     return {
         "name": cell.method,
         "scene": cell.scene.name,
         "status": worst.status,
         "reason": worst.reason if worst.status != "ok" else "",
-        "metrics": {row.metric: {"value": row.value, "unit": row.unit} for row in known},
+        "metrics": {row.metric: {"value": row.value, "unit": row.unit} for row in values},
         "folder": str(log.folder.path),
     }
 

@@ -81,19 +81,19 @@ class Metadata:
 
     def __post_init__(self) -> None:
         """Raise ValueError for the first field that cannot be meant."""
-        given = "roll_outs" if self.roll_outs else "program"
-        path = Path(getattr(self, given))
+        source = "roll_outs" if self.roll_outs else "program"
+        path = Path(getattr(self, source))
         demands = (
             ("protocol", self.protocol == NUMBER,
                 f"this is protocol {NUMBER}: make the roll-outs again with its scenes, and say '{NUMBER}'"),
             ("milliseconds", 0.0 < self.milliseconds < math.inf, "give a number above 0"),
             ("roll_outs", bool(self.roll_outs) != bool(self.program),
                 "give either roll_outs = 'roll-outs/{scene}.npz' or program = 'method.py'"),
-            (given, not path.is_absolute() and ".." not in path.parts,
+            (source, not path.is_absolute() and ".." not in path.parts,
                 "lies outside of the entry's folder: put it there"),
             ("scenes", set(self.scenes) <= set(SCENES), f"choose from {', '.join(SCENES)}"),
-            *((name, len(set(given)) == len(given), "give each once")
-                for name, given in (("scenes", self.scenes), ("seeds", self.seeds))),
+            *((name, len(set(values)) == len(values), "give each once")
+                for name, values in (("scenes", self.scenes), ("seeds", self.seeds))),
         )  # fmt: skip
         for name, fine, otherwise in demands:
             if not fine:
@@ -236,8 +236,8 @@ def write_scores(entry: Entry, run: RunFolder) -> int:
         mine = [row for row in rows if (row.scene, row.method) == (scene, entry.name)]
         bad = next((row for row in mine if row.status not in USABLE), None)
         if bad or not mine:
-            why = f"seed {bad.seed}: {bad.status}: {bad.reason}" if bad else "it did not run"
-            raise EntryError(f"{entry.path}: {scene}: {why}")
+            reason = f"seed {bad.seed}: {bad.status}: {bad.reason}" if bad else "it did not run"
+            raise EntryError(f"{entry.path}: {scene}: {reason}")
     cells = dict.fromkeys((row.scene, row.method, row.seed) for row in rows if row.method == entry.name)
     frames = {
         f"{flat(scene)}-seed{seed}": Trajectory.load(run.trajectory_path(scene, method, seed)).positions
@@ -281,8 +281,8 @@ def find_copies(entry: Entry, samples: dict[str, Floats]) -> None:
             theirs = theirs[:1] if whose == (entry.name, name) else theirs
             if theirs.shape[1] != frames.shape[1]:
                 continue
-            apart = cdist(frames, theirs) / math.sqrt(frames.shape[1] / 3)
-            same, nearest = apart.min(axis=1) <= SAME, apart.argmin(axis=1)
+            gaps = cdist(frames, theirs) / math.sqrt(frames.shape[1] / 3)
+            same, nearest = gaps.min(axis=1) <= SAME, gaps.argmin(axis=1)
             if same.mean() >= COPIED:
                 order = np.sign(np.diff(nearest[same]).mean())
                 way = {0.0: "one of them held", 1.0: "in order", -1.0: "in reverse"}[float(order)]

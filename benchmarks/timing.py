@@ -63,44 +63,44 @@ def one_thread() -> None:
 
 
 def clocked(
-    run: Callable[[], Made], *, of: Callable[[Made], np.ndarray], least: float = 0.0
+    run: Callable[[], Made], *, read: Callable[[Made], np.ndarray], min_time: float = 0.0
 ) -> tuple[Made, Reading]:
-    """Return the result of run(), and the time until all positions `of` it are there.
+    """Return the result of run(), and the time until all positions `read` from it are there.
 
-    run() is called again, MOST times at most, until `least` seconds are measured.
+    run() is called again, MOST times at most, until `min_time` [s] is measured.
     """
     import numpy as np
 
     gc.collect()  # what preparing has left is not charged to the run
     before = set(threading.enumerate())
     children = set(multiprocessing.active_children())
-    used, runs, earlier, first = 0.0, [], None, True
+    used, runs, last, first = 0.0, [], None, True
     while True:
         with _compilations() as compiled:
             _synchronise()
             busy, clock = time.process_time(), time.perf_counter()
             result = run()
-            np.add.reduce(np.asarray(of(result)), axis=None)  # what is computed when looked at is so now
+            np.add.reduce(np.asarray(read(result)), axis=None)  # computes what waits to be looked at
             _synchronise()
             seconds, busy = time.perf_counter() - clock, time.process_time() - busy
         if first and compiled:
-            first, earlier = False, result
+            first, last = False, result
             continue
         first = False
         runs.append(seconds)
         used += busy
-        if earlier is not None and np.may_share_memory(np.asarray(of(earlier)), np.asarray(of(result))):
-            again = "run() gave again what it had given before: each call of run() has to do all of the "
-            return result, Reading(tuple(runs), again + "work, and to return an array of its own")
-        if sum(runs) >= least or len(runs) == MOST:
+        if last is not None and np.may_share_memory(np.asarray(read(last)), np.asarray(read(result))):
+            fault = "run() gave again what it had given before: each call of run() has to do all of the "
+            return result, Reading(tuple(runs), fault + "work, and to return an array of its own")
+        if sum(runs) >= min_time or len(runs) == MOST:
             break
-        earlier = result  # held beyond the next run, so that what is new lies elsewhere
+        last = result  # held beyond the next run, so that what is new lies elsewhere
     seconds = sum(runs)
     if used > CROWDED * seconds + GRAIN:
         crowd = f"{used:.2f} s of processor time in {seconds:.2f} s: more than one thread has worked: "
         crowd += "leave the number of threads alone: one is set, see OMP_NUM_THREADS"
         return result, Reading(tuple(runs), crowd)
-    late = _still_at_work(of(result), before, children)
+    late = _still_at_work(read(result), before, children)
     late += ": wait in run() for all threads, processes and devices; leave none behind" if late else ""
     return result, Reading(tuple(runs), late)
 
@@ -125,21 +125,21 @@ def _still_at_work(
     """Watch the process for a moment: what does it do after it said that it was done?"""
     import numpy as np
 
-    seen = zlib.crc32(np.asarray(positions).tobytes())
+    crc = zlib.crc32(np.asarray(positions).tobytes())
     for _ in range(WATCHES):
         used, clock = time.process_time(), time.perf_counter()
         time.sleep(AFTER)
         busy = (time.process_time() - used) / (time.perf_counter() - clock)
-        if zlib.crc32(np.asarray(positions).tobytes()) != seen:
+        if zlib.crc32(np.asarray(positions).tobytes()) != crc:
             return "positions still changed after run() had come back"
         if busy <= BUSY:
             break
     if busy > BUSY:
         return f"the process was still at work ({100 * busy:.0f} %) after run() had come back"
     # The progress bar keeps a thread that sleeps; it moves no vertex.
-    left = [t.name for t in set(threading.enumerate()) - threads if type(t).__name__ != "TMonitor"]
-    left += [child.name for child in set(multiprocessing.active_children()) - children]
-    return f"{left[0]} was still running after run() had come back" if left else ""
+    names = [t.name for t in set(threading.enumerate()) - threads if type(t).__name__ != "TMonitor"]
+    names += [child.name for child in set(multiprocessing.active_children()) - children]
+    return f"{names[0]} was still running after run() had come back" if names else ""
 
 
 def _synchronise() -> None:

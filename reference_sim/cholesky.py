@@ -116,10 +116,10 @@ class ScalarPattern:
         pairs = [np.zeros((0, 2), np.int64)]
         for stencil in stencils:
             k = stencil.shape[1]
-            both = stencil[:, [(a, b) for a in range(k) for b in range(a)]].reshape(-1, 2)
-            pairs.append(both[(both >= 0).all(axis=1) & (both[:, 0] != both[:, 1])])
-        both = np.sort(np.concatenate(pairs), axis=1)
-        pair = np.stack(np.divmod(np.unique(both[:, 0] * count + both[:, 1]), count), axis=1)
+            ends = stencil[:, [(a, b) for a in range(k) for b in range(a)]].reshape(-1, 2)
+            pairs.append(ends[(ends >= 0).all(axis=1) & (ends[:, 0] != ends[:, 1])])
+        ends = np.sort(np.concatenate(pairs), axis=1)
+        pair = np.stack(np.divmod(np.unique(ends[:, 0] * count + ends[:, 1]), count), axis=1)
         ones = np.ones(len(pair))
         lower = sp.csr_matrix((ones, (pair[:, 1], pair[:, 0])), shape=(count, count))
         self.order = np.asarray(nested_dissection((lower + lower.T).tocsr()), np.int64)
@@ -173,13 +173,13 @@ def _pattern_of_rows(starts: np.ndarray, columns: np.ndarray) -> tuple[np.ndarra
 def _row_patterns(starts, columns, row, out):
     """Walk up the elimination tree from each entry: row[k + 1] counts, or out is filled from row[k] on."""
     count = len(starts) - 1
-    parent, seen = np.full(count, -1), np.full(count, -1)
+    parent, mark = np.full(count, -1), np.full(count, -1)
     for k in range(count):
-        seen[k], place = k, row[k]
+        mark[k], place = k, row[k]
         for p in range(starts[k], starts[k + 1]):
             i = columns[p]
-            while seen[i] != k:
-                seen[i] = k
+            while mark[i] != k:
+                mark[i] = k
                 if parent[i] < 0:
                     parent[i] = k
                 if len(out):

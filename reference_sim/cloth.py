@@ -69,8 +69,8 @@ class Cloth:
             raise MeshError(
                 f"face {small[0]} has no rest area ({self.areas[small[0]]:.3g} m^2): remove it"
             )
-        edges, beside, _ = self._edge_table  # raises on non-manifold edges
-        _refuse_open_seams(positions, faces, np.unique(edges[(beside < 0).any(axis=1)]))
+        edges, sides, _ = self._edge_table  # raises on non-manifold edges
+        _refuse_open_seams(positions, faces, np.unique(edges[(sides < 0).any(axis=1)]))
 
     @property
     def vertex_count(self) -> int:
@@ -188,23 +188,23 @@ def edge_table(faces: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.nda
             f"edge ({edges[bad, 0]}, {edges[bad, 1]}) has {count[bad]} faces {sharing}: a surface is "
             "manifold, split it"
         )
-    beside = np.full((len(unique), 2), -1, dtype=np.int64)
+    sides = np.full((len(unique), 2), -1, dtype=np.int64)
     tips = np.full((len(unique), 2), -1, dtype=np.int64)
     forward = half[:, 0] < half[:, 1]
     for side in (0, 1):
-        has = count > side
-        halves = order[start[has] + side]
+        rows = np.flatnonzero(count > side)
+        halves = order[start[rows] + side]
         column = np.where(forward[halves], 0, 1)
-        taken = beside[has, column] >= 0
-        if taken.any():
-            bad = np.flatnonzero(has)[taken][0]
+        clashes = sides[rows, column] >= 0
+        if clashes.any():
+            bad = rows[clashes][0]
             raise MeshError(
-                f"faces {beside[bad].max()} and {halves[taken][0] // 3} walk edge "
+                f"faces {sides[bad].max()} and {halves[clashes][0] // 3} walk edge "
                 f"({edges[bad, 0]}, {edges[bad, 1]}) the same way: make the winding consistent"
             )
-        beside[np.flatnonzero(has), column] = halves // 3
-        tips[np.flatnonzero(has), column] = opposite[halves]
-    return edges, beside, tips
+        sides[rows, column] = halves // 3
+        tips[rows, column] = opposite[halves]
+    return edges, sides, tips
 
 
 # Of the lowest face at either: boundary vertices nearer than that are of a seam left open.
@@ -229,13 +229,13 @@ def _refuse_open_seams(positions: np.ndarray, faces: np.ndarray, rim: np.ndarray
     radius = OPEN_SEAM * heights[rim].max()
     pairs = rim[cKDTree(positions[rim]).query_pairs(radius, output_type="ndarray")]
     gaps = np.linalg.norm(np.diff(positions[pairs], axis=1)[:, 0], axis=1)
-    close = gaps < OPEN_SEAM * heights[pairs].min(axis=1)
-    if not close.any():
+    seam = gaps < OPEN_SEAM * heights[pairs].min(axis=1)
+    if not seam.any():
         return
-    apart, gap = pairs[close], 1e3 * gaps[close].max()
-    place = ", ".join(f"{x:.3f}" for x in positions[apart.min()])
+    ends, gap = pairs[seam], 1e3 * gaps[seam].max()
+    place = ", ".join(f"{x:.3f}" for x in positions[ends.min()])
     raise MeshError(
-        f"{len(np.unique(apart))} vertices of a seam lie up to {gap:.2g} mm apart, one at ({place}) m: merge "
+        f"{len(np.unique(ends))} vertices of a seam lie up to {gap:.2g} mm apart, one at ({place}) m: merge "
         f"vertices closer than {1.1 * gap:.2g} mm (weld); where a slit is meant, open it wider"
     )
 
@@ -263,7 +263,7 @@ def check_mesh(positions: np.ndarray, faces: np.ndarray) -> None:
     if unused.size:
         raise MeshError(f"vertex {unused[0]} belongs to no face: remove it")
     order = np.lexsort(positions.T)
-    same = np.flatnonzero((np.diff(positions[order], axis=0) == 0).all(axis=1))
-    if same.size:
-        pair = sorted(order[same[0] : same[0] + 2].tolist())
+    twins = np.flatnonzero((np.diff(positions[order], axis=0) == 0).all(axis=1))
+    if twins.size:
+        pair = sorted(order[twins[0] : twins[0] + 2].tolist())
         raise MeshError(f"vertices {pair[0]} and {pair[1]} coincide: merge them (weld)")

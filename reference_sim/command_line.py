@@ -37,9 +37,9 @@ class Parser(argparse.ArgumentParser):
         for word in (*arguments, os.getcwd()):
             if word.encode(errors="replace").decode() != word:
                 self.error(f"{word!a} is no text: rename this file or folder")
-        for before, word in zip(["", *arguments], arguments):
+        for option, word in zip(["", *arguments], arguments):
             if not word.strip(", ") or (word.startswith("--") and word.endswith("=")):
-                self.error(f"{before} '{word}' names nothing: give a value, or leave it out")
+                self.error(f"{option} '{word}' names nothing: give a value, or leave it out")
         return super().parse_known_args(args, namespace)
 
     def error(self, message: str) -> NoReturn:
@@ -93,8 +93,8 @@ def progress_bar(*args: Any, **options: Any) -> Any:
 
 def compilation_is_due() -> bool:
     """Return whether no kernel lies compiled on disk."""
-    found = (folder.rglob("reference_sim.*-*/*.nbi") for folder in _kernel_folders())
-    return not any(chain.from_iterable(found))
+    files = (folder.rglob("reference_sim.*-*/*.nbi") for folder in _kernel_folders())
+    return not any(chain.from_iterable(files))
 
 
 def announce_compilation() -> None:
@@ -116,10 +116,10 @@ def announce_compilation() -> None:
 
 def _kernel_folders() -> list[Path]:
     """Return the places of reference_sim.kernels.kernel_cache, which is not imported: it loads numba."""
-    if given := os.environ.get("NUMBA_CACHE_DIR"):
-        return [Path(given)]
-    of_user = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
-    return [Path(__file__).parent, Path(of_user, "numba")]
+    if folder := os.environ.get("NUMBA_CACHE_DIR"):
+        return [Path(folder)]
+    cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return [Path(__file__).parent, Path(cache, "numba")]
 
 
 def _can_be_written(folder: Path) -> bool:

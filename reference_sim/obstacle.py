@@ -46,8 +46,8 @@ def reachable_faces(rest_points: np.ndarray, centroids: np.ndarray, region: floa
 
     if cKDTree(centroids).query(rest_points)[0].max() > region:
         return np.arange(len(centroids))
-    near = cKDTree(rest_points).query(centroids, distance_upper_bound=region)[0]
-    return np.flatnonzero(np.isfinite(near))
+    distances = cKDTree(rest_points).query(centroids, distance_upper_bound=region)[0]
+    return np.flatnonzero(np.isfinite(distances))
 
 
 class Obstacle:

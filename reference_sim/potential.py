@@ -85,9 +85,9 @@ class HessianPattern:
         needed = np.setdiff1d(needed, self._fixed._key, assume_unique=True)
         if not len(np.setdiff1d(needed, self._key, assume_unique=True)):
             return self
-        kept = np.setdiff1d(self._key, self._fixed._key, assume_unique=True)
-        if len(kept) < SPARE_BLOCKS * len(needed):
-            needed = np.union1d(kept, needed)
+        spare = np.setdiff1d(self._key, self._fixed._key, assume_unique=True)
+        if len(spare) < SPARE_BLOCKS * len(needed):
+            needed = np.union1d(spare, needed)
         wider = copy.copy(self._fixed)
         for cached in ("order", "_constant"):
             wider.__dict__.pop(cached, None)

@@ -99,14 +99,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )  # fmt: skip
     motion.save(path)
     fields = motion.frame_fields
-    last = [
+    joules = [
         f"{name[7:]} {values[-1]:.3g}" for name, values in fields.items() if name.startswith("energy/")
     ]
     print(
         f"frames     {motion.frames} of {frames}, {int(fields['converged'].sum())} converged\n"
         f"status     {motion.status}{motion.reason and ': '}{motion.reason}\n"
         f"pins       {len(pins)} {'ride on the obstacle' if rides else 'stay in place'}\n"
-        f"energies   {', '.join(last)} J at the last frame\nwrote      {path}"
+        f"energies   {', '.join(joules)} J at the last frame\nwrote      {path}"
     )
     return 0 if motion.frames == frames and motion.status == "converged" else 1
 
@@ -126,17 +126,17 @@ def read_cloth(options: argparse.Namespace) -> Cloth:
         raise ValueError(f"{options.garment}: {error}") from None
 
 
-def choose_pins(which: str | None, positions: np.ndarray) -> list[int]:
-    """Return the vertices that `which` names among positions (V, 3) [m, y up]: "0,9", or "top" (1 %)."""
-    if which is None:
+def choose_pins(choice: str | None, positions: np.ndarray) -> list[int]:
+    """Return the vertices that `choice` names among positions (V, 3) [m, y up]: "0,9", or "top" (1 %)."""
+    if choice is None:
         return []
-    if which == "top":
+    if choice == "top":
         height = positions[:, 1]
         return (height >= height.max() - 0.01 * (height.max() - height.min())).nonzero()[0].tolist()
-    numbers = [word.strip() for word in which.split(",")]
+    numbers = [word.strip() for word in choice.split(",")]
     if not all(word.isdecimal() and int(word) < len(positions) for word in numbers):
         raise ValueError(
-            f"--pins {which!r}: give 'top', or vertices from 0 to {len(positions) - 1} as '0,9'"
+            f"--pins {choice!r}: give 'top', or vertices from 0 to {len(positions) - 1} as '0,9'"
         )
     return [int(word) for word in numbers]
 

@@ -322,9 +322,9 @@ def _fields(results: Sequence[Result]) -> dict[str, float]:
     } | {f"energy/{name}": value for name, value in results[-1].terms.items()}
 
 
-def _finite(value: np.ndarray, shape: tuple[int, ...], what: str) -> np.ndarray:
+def _finite(value: np.ndarray, shape: tuple[int, ...], label: str) -> np.ndarray:
     """Return a copy of finite numbers of this shape. Raises ValueError for any others."""
     value = np.array(value, dtype=np.float64)
     if value.shape != shape or not np.isfinite(value).all():
-        raise ValueError(f"simulate: {what} is {value.shape}: finite numbers {shape} are due")
+        raise ValueError(f"simulate: {label} is {value.shape}: finite numbers {shape} are due")
     return value

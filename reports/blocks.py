@@ -57,36 +57,36 @@ class TableBlock:
     """A table; the PDF prints at most so many lines, none that ends in one of `left_out`."""
 
     name: str
-    most: int = ROWS
+    limit: int = ROWS
     left_out: tuple[str, ...] = ()
 
     def printed(self, table: Table) -> Table:
         """Return the first columns, and of rows the first of each group; a note says where the others are."""
         rows = [row for row in table.rows if not set(row) & set(self.left_out)]
-        heads = [place for place, column in enumerate(table.columns) if column.name in table.grouped_by]
-        groups = pd.Series([" · ".join(str(row[place]) for place in heads) for row in rows], dtype=str)
+        heads = [k for k, column in enumerate(table.columns) if column.name in table.grouped_by]
+        groups = pd.Series([" · ".join(str(row[k]) for k in heads) for row in rows], dtype=str)
         order = groups.groupby(groups).cumcount().sort_values(kind="stable")
-        least = OF_GARMENT * groups.nunique() * (table.grouped_by == ("garment",))
-        rows = [rows[line] for line in sorted(order.index[: max(self.most, least)])]
-        numbers = [place for place, column in enumerate(table.columns) if not column.text]
-        places = [place for place in range(len(table.columns)) if place not in numbers[COLUMNS:]]
+        minimum = OF_GARMENT * groups.nunique() * (table.grouped_by == ("garment",))
+        rows = [rows[line] for line in sorted(order.index[: max(self.limit, minimum)])]
+        numbers = [k for k, column in enumerate(table.columns) if not column.text]
+        places = [k for k in range(len(table.columns)) if k not in numbers[COLUMNS:]]
         counts = {"rows": len(table.rows) - len(rows), "columns": len(table.columns) - len(places)}
-        more = " and ".join(f"{count} more {what}" for what, count in counts.items() if count)
-        rest = f"{more} are in tables/{table.name}.csv. " if more else ""
+        rest = " and ".join(f"{count} more {unit}" for unit, count in counts.items() if count)
+        remark = f"{rest} are in tables/{table.name}.csv. " if rest else ""
         reason = next((k for k, column in enumerate(table.columns) if column.name == "reason"), None)
         if reason is not None:
             rows = [(*row[:reason], shorten(str(row[reason]), LETTERS, placeholder="…")) for row in rows]
         return replace(
             table,
-            columns=tuple(table.columns[place] for place in places),
-            rows=tuple(tuple(row[place] for place in places) for row in rows),
-            note=(rest + table.note).strip(),
+            columns=tuple(table.columns[k] for k in places),
+            rows=tuple(tuple(row[k] for k in places) for row in rows),
+            note=(remark + table.note).strip(),
         )
 
 
 BLOCKS: tuple[Heading | Figure | TableBlock, ...] = (
     TableBlock("paper_table_1"),
-    TableBlock("paper_table_2", most=24),
+    TableBlock("paper_table_2", limit=24),
     Figure("frames", side_by_side),
     Figure("error_against_time", error_of_page_one),
     TableBlock("overview"),
@@ -94,7 +94,7 @@ BLOCKS: tuple[Heading | Figure | TableBlock, ...] = (
     TableBlock("energies"),
     TableBlock("table_1"),
     TableBlock("curvature"),
-    TableBlock("table_2", most=24),
+    TableBlock("table_2", limit=24),
     TableBlock("cost"),
     Heading("Findings"),
     TableBlock("relative_excess"),

@@ -61,8 +61,8 @@ def build_report(run_dir: str | Path) -> Built:
     tables = make_tables(run)
     write_tables(folder.tables, tables.values())
     write_paper_table(folder, run)
-    with ProcessPoolExecutor(1) as beside:  # the page takes as long as figures and PDF
-        page = beside.submit(_write_page, folder, Report(run, tables, {}))
+    with ProcessPoolExecutor(1) as pool:  # the page takes as long as figures and PDF
+        page = pool.submit(_write_page, folder, Report(run, tables, {}))
         pdf = write_pdf(folder, Report(run, tables, draw_figures(run, folder.figures, FIGURES)))
         problems = dict.fromkeys([*run.problems, *page.result(), *run.warnings])
     lines = filter(None, (answer(run, tables), against_published(run)))
@@ -99,8 +99,8 @@ def save_still(run_dir: str | Path, method: str, path: Path) -> None:
     scene = str(run.frame[run.frame["method"] == method]["scene"].iloc[0])
     cloth = run.roll_outs.cloth(scene, method, 0)
     assert cloth is not None
-    selected = SceneRollOuts(scene, {method: cloth}, None, {method: run.label(method)})
-    (image,) = draw_frames(selected, 160, AZIMUTH, [selected.lively_frame()[0]])
+    group = SceneRollOuts(scene, {method: cloth}, None, {method: run.label(method)})
+    (image,) = draw_frames(group, 160, AZIMUTH, [group.lively_frame()[0]])
     Image.fromarray(image).quantize(32).save(path)
 
 

@@ -138,36 +138,34 @@ def compare(
     _demand_same_scenes(one, other)
     cells = [_cells(run) for run in (one, other)]
     frames = [frame[_matching(frame["method"], methods)] for frame in cells]
-    ended = endings(*frames)
+    of_cells = endings(*frames)
     of_metrics = [frame[_matching(frame["metric"], metrics)] for frame in frames]
     if not times or set(one.frame["hardware"]) != set(other.frame["hardware"]):
         machines = [m.name for run in (one, other) for m in run.metrics.values() if m.of == "machine"]
         of_metrics = [frame[~frame["metric"].isin(machines)] for frame in of_metrics]
-    lost = [] if shared else gone(*of_metrics)
+    losses = [] if shared else gone(*of_metrics)
     both = _shared(of_metrics, *CELL)
     if both[0].empty:
         raise ResultsError(
             "the two runs share no such scene, method, seed and metric: nothing to compare"
         )
     before, after = (frame.set_index(CELL)["protocol"] for frame in both)
-    differ = before[before != after.reindex(before.index)]
-    if len(differ):
-        place = " x ".join(map(str, differ.index[0][:2]))
-        now = after[differ.index[0]]
+    clashes = before[before != after.reindex(before.index)]
+    if len(clashes):
+        place = " x ".join(map(str, clashes.index[0][:2]))
+        protocol = after[clashes.index[0]]
         raise ResultsError(
-            f"{place}: of protocol {differ.iloc[0]} in A, {now} in B: another reference or scene"
+            f"{place}: of protocol {clashes.iloc[0]} in A, {protocol} in B: another reference or scene"
         )
-    drawn = _of_one_seed(*of_metrics)
-    alone = set(drawn[1]["method"])
-    both = [frame[~(frame["seeded"] & frame["method"].isin(alone))] for frame in both]
-    judged, compared = _means(one, *_without_more_noise(*both), basis=cells[0])
-    earlier, later = _with_known_zero(one, *drawn, basis=cells[0])
+    lone_seeds = _of_one_seed(*of_metrics)
+    networks = set(lone_seeds[1]["method"])
+    both = [frame[~(frame["seeded"] & frame["method"].isin(networks))] for frame in both]
+    of_means, count = _means(one, *_without_more_noise(*both), basis=cells[0])
+    earlier, later = _with_known_zero(one, *lone_seeds, basis=cells[0])
     of_one_seed = changed_scenes(earlier, later, _metrics(one))
     order = (GONE, WORSE, BETTER, OTHER)
-    changes = sorted(
-        [*lost, *ended, *judged, *of_one_seed], key=lambda change: order.index(change.verdict)
-    )
-    return Comparison(tuple(changes), compared, _headline(one, of_metrics, changes))
+    changes = sorted([*losses, *of_cells, *of_means, *of_one_seed], key=lambda c: order.index(c.verdict))
+    return Comparison(tuple(changes), count, _headline(one, of_metrics, changes))
 
 
 HEADLINE = (
@@ -184,19 +182,19 @@ def _headline(
     """
     garment, (_, clips) = run.first_garment, timed_rows(run, run.frame)
     usable = [f[f["usable"] & (f["case"] == "")] for f in frames]
-    worn, timed = (
+    rows, clip_rows = (
         _shared([f[f[column].isin(names)] for f in usable], "scene", "method", "metric")
         for column, names in (("place", [garment]), ("scene", clips))
     )
-    names = run.ordered(set(worn[0]["method"]) - run.twins - set(run.with_role("reference-variant")))
+    names = run.ordered(set(rows[0]["method"]) - run.twins - set(run.with_role("reference-variant")))
     headline = {}
     for method in sorted(names, key=lambda name: name != NETWORK):
-        seeds = [set(f[(f["method"] == method) & f["seeded"]]["seed"]) for f in worn]
+        seeds = [set(f[(f["method"] == method) & f["seeded"]]["seed"]) for f in rows]
         verdict = "one seed" if len(seeds[0]) == len(seeds[1]) == 1 else "same"
         cells = []
         for metric in HEADLINE:
-            rows = timed if metric == WHOLE and clips else worn
-            before, after = (_value(run, frame, method, metric) for frame in rows)
+            pair = clip_rows if metric == WHOLE and clips else rows
+            before, after = (_value(run, frame, method, metric) for frame in pair)
             verdicts = {c.place: c.verdict for c in changes if (c.method, c.metric) == (method, metric)}
             scenes = " and ".join(sorted({f"{change} in a scene" for change in verdicts.values()}))
             note = verdicts.get(garment) or scenes or verdict
@@ -222,17 +220,17 @@ def _of_one_seed(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:
     """
     rows = [frame[frame["seeded"] & frame["usable"] & (frame["case"] == "")] for frame in (one, other)]
     before, after = (frame.groupby("method", observed=True)["seed"].nunique() for frame in rows)
-    alone = [name for name in after.index[after == 1] if before.get(name, 0) > 1]
-    rows = [frame[frame["method"].isin(alone)] for frame in rows]
+    networks = [name for name in after.index[after == 1] if before.get(name, 0) > 1]
+    rows = [frame[frame["method"].isin(networks)] for frame in rows]
     return _shared(rows, "scene", "method", "metric")
 
 
 def _without_more_noise(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:
     """Return both; no later answer is less certain than the earlier, which would hide changes."""
-    least = one.set_index(CELL)["uncertainty"].reindex(other.set_index(CELL).index).fillna(0.0).to_numpy()
+    cap = one.set_index(CELL)["uncertainty"].reindex(other.set_index(CELL).index).fillna(0.0).to_numpy()
     timed = other["unit"].isin(("s", "ms"))
-    now = other["uncertainty"]
-    return [one, other.assign(uncertainty=now.where(timed | (now <= least), least))]
+    noise = other["uncertainty"]
+    return [one, other.assign(uncertainty=noise.where(timed | (noise <= cap), cap))]
 
 
 def _demand_same_scenes(one: Run, other: Run) -> None:
@@ -256,15 +254,15 @@ def _cells(run: Run) -> pd.DataFrame:
     cases = run.frame[run.frame["case"] != ""].drop_duplicates(CELL)
     frame = pd.concat([run.cells(), cases], ignore_index=True)
     frame = frame[frame["status"] != "skipped"]
-    worn = (frame["suite"] == "garments") & (frame["garment"] != "")
-    frame = frame.assign(place=frame["garment"].where(worn, frame["scene"]))
+    is_garment = (frame["suite"] == "garments") & (frame["garment"] != "")
+    frame = frame.assign(place=frame["garment"].where(is_garment, frame["scene"]))
     cell = ["scene", "method", "seed"]
     inference, repeats = (
         frame[frame["metric"] == name].set_index(cell)["value"] for name in (TIME, REPEATS)
     )
     timed = frame["metric"].isin((TIME, WHOLE))  # inference alone is repeated, its inputs are not
-    apart = (inference * repeats / 100.0).reindex(pd.MultiIndex.from_frame(frame.loc[timed, cell]))
-    frame.loc[timed, "uncertainty"] = apart.to_numpy()
+    ranges = (inference * repeats / 100.0).reindex(pd.MultiIndex.from_frame(frame.loc[timed, cell]))
+    frame.loc[timed, "uncertainty"] = ranges.to_numpy()
     # Another run has another reference: uncertainties add up.
     return frame[frame["metric"] != REPEATS].drop(columns="moved")
 
@@ -288,30 +286,30 @@ def _means(
     scales = (
         rows[0].groupby(["place", "metric"])["value"].agg(lambda values: values.abs().median()).to_dict()
     )
-    judged = [
+    candidates = [
         (place, method, metric := metrics[name], mean, new, _effect(metric, new, mean))
         for (place, method, name), (mean, new) in differ.items()
         if name != WORST and (not mean.seeded or mean.seeds > 1)
     ]
-    p_values = [far.p_value() for *_, far in judged]
+    p_values = [shift.p_value() for *_, shift in candidates]
     corrected = iter(holm([p for p in p_values if p is not None]))
     changes = []
-    for (place, method, metric, mean, new, far), alone in zip(judged, p_values):
-        p = None if alone is None else next(corrected)
-        if within_tolerance(metric, mean, new, far, float(scales[place, metric.name])):
+    for (place, method, metric, mean, new, shift), raw_p in zip(candidates, p_values):
+        p = None if raw_p is None else next(corrected)
+        if within_tolerance(metric, mean, new, shift, float(scales[place, metric.name])):
             continue
         if metric.of == "machine" and mean.uncertainty is None and mean.seeds < 2:
-            if far.scale == RATIO and max(far.shown, 1.0 / far.shown) < ONCE:
+            if shift.scale == RATIO and max(shift.shown, 1.0 / shift.shown) < ONCE:
                 continue
-        elif not _beyond_noise(metric, far, p):
+        elif not _beyond_noise(metric, shift, p):
             continue
-        size = size_of(metric, mean, new, far, p)
+        size = size_of(metric, mean, new, shift, p)
         changes.append(
-            Change(side(metric, mean.value, new.value, far.value), place, method, metric.name, size)
+            Change(side(metric, mean.value, new.value, shift.value), place, method, metric.name, size)
         )
-    reported = {(change.place, change.method, change.metric) for change in changes}
-    worn = rows[0][rows[0]["place"] != rows[0]["scene"]]
-    garments = dict(zip(worn["scene"], worn["place"]))
+    reported = {(c.place, c.method, c.metric) for c in changes}
+    pairs = rows[0][rows[0]["place"] != rows[0]["scene"]]
+    garments = dict(zip(pairs["scene"], pairs["place"]))
     before, after = (frame[frame["scene"].isin(garments)] for frame in rows)
     of_scenes = changed_scenes(before, after, metrics)
     changes += [c for c in of_scenes if (garments[c.place], c.method, c.metric) not in reported]
@@ -325,7 +323,7 @@ def _with_known_zero(run: Run, *frames: pd.DataFrame, basis: pd.DataFrame) -> li
     """
     shares = []
     for frame in frames:
-        for metric in (metric for metric in run.metrics.values() if metric.arbitrary_zero):
+        for metric in (m for m in run.metrics.values() if m.arbitrary_zero):
             frame = with_relative_excess(run, frame, metric.name, basis=basis)
             excess = frame[frame["metric"] == relative_metric(metric.name).name]
             covered = frame.set_index(CELL[:3]).index.isin(excess.set_index(CELL[:3]).index)
@@ -336,8 +334,8 @@ def _with_known_zero(run: Run, *frames: pd.DataFrame, basis: pd.DataFrame) -> li
 
 def _metrics(run: Run) -> dict[str, Metric]:
     """Return the metrics of the run by name, those of relative excess among them."""
-    relative = (relative_metric(metric.name) for metric in run.metrics.values() if metric.arbitrary_zero)
-    return {**{metric.name: metric for metric in relative}, **run.metrics}
+    relative = (relative_metric(m.name) for m in run.metrics.values() if m.arbitrary_zero)
+    return {**{m.name: m for m in relative}, **run.metrics}
 
 
 def _effect(metric: Metric, new: Mean, before: Mean) -> Effect:
@@ -347,14 +345,14 @@ def _effect(metric: Metric, new: Mean, before: Mean) -> Effect:
     return effect(new, before, DIFFERENCE) if metric.arbitrary_zero else effect_of(metric, new, before)
 
 
-def _beyond_noise(metric: Metric, far: Effect, p: float | None) -> bool:
+def _beyond_noise(metric: Metric, shift: Effect, p: float | None) -> bool:
     """Return whether a change is more than what another draw of seeds, or of times, would do."""
     if metric.of == "machine":
-        low, high = far.ends or (far.value - far.uncertainty, far.value + far.uncertainty)
-        return far.scale != RATIO or max(low, -high) > math.log1p(TIME_TOLERANCE)  # from 0, or to 0
+        low, high = shift.ends or (shift.value - shift.uncertainty, shift.value + shift.uncertainty)
+        return shift.scale != RATIO or max(low, -high) > math.log1p(TIME_TOLERANCE)  # from 0, or to 0
     if p is None:
-        return abs(far.above()) > SPREADS * far.uncertainty
-    return abs(far.above()) > far.uncertainty and p < LEVEL
+        return abs(shift.above()) > SPREADS * shift.uncertainty
+    return abs(shift.above()) > shift.uncertainty and p < LEVEL
 
 
 def _over_the_same(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:

@@ -85,7 +85,7 @@ class Scored:
         rows = self.run.garment_rows
         rows = rows[rows["scene"].isin(self.scenes)]
         excess = excess_of(self.run, rows, self.method)
-        numbers = [mean_of(rows, self.method, metric) for metric in (DYNAMICS, PENETRATION, TIME)]
+        means = [mean_of(rows, self.method, metric) for metric in (DYNAMICS, PENETRATION, TIME)]
         timed = rows[(rows["method"] == self.method) & (rows["metric"] == TIME)]
         declared = (timed["reason"] == DECLARED).any()
         clock = "declared" if declared else "measured" if len(timed) else "unknown"
@@ -95,8 +95,8 @@ class Scored:
         config = self.run.config
         hashes = config.get("roll_outs") if self.folder else None
         origin = (config.get("commit") or "", (config.get("date") or config.get("started") or "")[:10])
-        of = sha256("".join(hashes.values()).encode()).hexdigest()[:8] if hashes else ""
-        return (None, self.title, energy, *numbers, clock, self.learned_from, self.proof(), *origin, of)
+        digest = sha256("".join(hashes.values()).encode()).hexdigest()[:8] if hashes else ""
+        return (None, self.title, energy, *means, clock, self.learned_from, self.proof(), *origin, digest)
 
 
 def of_entry(folder: Path) -> Scored:
@@ -105,19 +105,19 @@ def of_entry(folder: Path) -> Scored:
     Raises:
         ResultsError: no scores, run.json without the entry's metadata, or scores of another name.
     """
-    scores, again = RunFolder(folder / "scores"), f"run python -m benchmarks.submit score {folder}"
+    scores, advice = RunFolder(folder / "scores"), f"run python -m benchmarks.submit score {folder}"
     if not scores.config_path.is_file():
-        raise ResultsError(f"{folder}: has no scores: {again}")
+        raise ResultsError(f"{folder}: has no scores: {advice}")
     run, name = read_run(scores), folder.resolve().name
     try:
         title, authors, data = (
             run.config["metadata"][key] for key in ("title", "authors", "training_data")
         )
     except (KeyError, TypeError):
-        raise ResultsError(f"{scores.config_path}: has no metadata of an entry: {again}") from None
+        raise ResultsError(f"{scores.config_path}: has no metadata of an entry: {advice}") from None
     scenes = tuple(sorted(set(run.frame[run.frame["method"] == name]["scene"])))
     if not scenes:
-        remedy = f"give the folder its old name, or {again}"
+        remedy = f"give the folder its old name, or {advice}"
         raise ResultsError(f"{scores.rows_path}: no scores of '{name}': {remedy}")
     return Scored(run, name, f"{title}; {authors}", data, scenes, folder)
 
@@ -159,8 +159,8 @@ def entries_tables(
         every = [*scored, *(of_published(name, run, scenes) if protocol == run.protocol else ())]
         lines = sorted(((entry.cells(), entry) for entry in every), key=lambda line: _excess(line[0]))
         part = "all" if set(scenes) == set(full) else f"{len(scenes)} of {len(full)}: {', '.join(scenes)}"
-        what = f"Protocol {protocol}" if protocol[:1].isdigit() else protocol.capitalize()
-        caption = f"{what}; scenes: {part}."
+        title = f"Protocol {protocol}" if protocol[:1].isdigit() else protocol.capitalize()
+        caption = f"{title}; scenes: {part}."
         rows = tuple((place, *cells[1:]) for place, (cells, _) in enumerate(lines, 1))
         tables.append((Table("entries", COLUMNS, rows, caption), [scored for _, scored in lines]))
     return tables

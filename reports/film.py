@@ -94,11 +94,11 @@ def write_frames(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:
     drawn[0].save(path, save_all=True, append_images=drawn[1:], duration=durations, loop=0)
 
 
-def write_point_caches(path: Path, selected: SceneRollOuts) -> None:
+def write_point_caches(path: Path, group: SceneRollOuts) -> None:
     """Write the vertices of each method, and of the body, as NAME_METHOD.pc2 with an .obj beside it."""
     from reference_sim.trajectory import write_point_cache
 
-    for name, mesh in ({**selected.series, **({"body": selected.body} if selected.body else {})}).items():
+    for name, mesh in ({**group.series, **({"body": group.body} if group.body else {})}).items():
         write_point_cache(path.with_stem(f"{path.stem}_{name.replace('/', '-')}"), mesh)
 
 
@@ -125,13 +125,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if path.suffix not in (".gif", ".png", ".pc2"):
         raise ValueError(f"{path}: a film ends in .gif, a picture in .png, point caches in .pc2")
     demand_writable_folder(path.parent)
-    selected = select_roll_outs(RunFolder(options.run_dir), options.scene, methods, options.seed)
-    one_frame = [selected.lively_frame()[0]] if path.suffix == ".png" else None
-    images = draw_frames(selected, options.width, options.azimuth, one_frame)
+    group = select_roll_outs(RunFolder(options.run_dir), options.scene, methods, options.seed)
+    one_frame = [group.lively_frame()[0]] if path.suffix == ".png" else None
+    images = draw_frames(group, options.width, options.azimuth, one_frame)
     if path.suffix == ".pc2":
-        write_point_caches(path, selected)
+        write_point_caches(path, group)
     else:
-        dt = selected.longest.dt
+        dt = group.longest.dt
         with replacing(path) as temporary:
             write_frames(temporary, images, 1.0 / dt if dt > 0.0 else 1.0)
     print(path)

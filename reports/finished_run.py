@@ -139,7 +139,7 @@ class Run:
 
     def garments(self, frame: pd.DataFrame) -> dict[str, list[str]]:
         """Return garment -> its scenes among these rows, in the order in which run.json declares them."""
-        declared = {name: place for place, name in enumerate(self.config.get("scenes") or ())}
+        declared = {name: k for k, name in enumerate(self.config.get("scenes") or ())}
         pairs = frame[frame["garment"] != ""][["garment", "scene"]].drop_duplicates()
         scenes: dict[str, list[str]] = {}
         for garment, scene in sorted(pairs.itertuples(index=False), key=lambda p: declared.get(p[1], 0)):
@@ -278,8 +278,8 @@ def read_run(folder: RunFolder) -> Run:
     config, rows = folder.read_config(), folder.read_rows()
     if not rows:
         raise ResultsError(f"{folder.rows_path}: holds no rows; nothing to report")
-    changed = folder.changed(config.get("digests") or {})
-    run = make_run(config, rows, [name for name, how in changed.items() if how == "damaged"])
+    changes = folder.changed(config.get("digests") or {})
+    run = make_run(config, rows, [name for name, state in changes.items() if state == "damaged"])
     return replace(
         run,
         protocol=one_protocol(run.frame["protocol"], folder.rows_path),

@@ -71,17 +71,16 @@ def _figure(picture: Picture) -> Values:
 
 def lay_out_table(run: Run, table: Table) -> Values:
     """Return the values of a table."""
-    heads = [place for place, column in enumerate(table.columns) if column.name in table.grouped_by]
-    places = [place for place in range(len(table.columns)) if place not in heads]
-    columns = [table.columns[place] for place in places]
+    heads = [k for k, column in enumerate(table.columns) if column.name in table.grouped_by]
+    places = [k for k in range(len(table.columns)) if k not in heads]
+    columns = [table.columns[k] for k in places]
     cells = [
-        column_texts(run, column, [row[place] for row in table.rows])
-        for place, column in zip(places, columns)
+        column_texts(run, column, [row[k] for row in table.rows]) for k, column in zip(places, columns)
     ]
     lines = [list(line) for line in zip(*cells)]
     groups: dict[str, list[list[CellText]]] = {}
     for row, line in zip(table.rows, lines):
-        groups.setdefault(" · ".join(str(row[place]) for place in heads), []).append(line)
+        groups.setdefault(" · ".join(str(row[k]) for k in heads), []).append(line)
     return {
         "kind": "table",
         "caption": table.caption,

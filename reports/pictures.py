@@ -88,9 +88,9 @@ def _paint(
     scale = h / camera.height
     points = np.stack([w / 2.0 + scale * view[:, 0], h / 2.0 - scale * view[:, 1]], axis=1)
     pixels, faces, weights = _covered(points[surface.faces], w, h)
-    near = np.einsum("pk,pk->p", weights, view[surface.faces[faces], 2]) + surface.lift
-    np.maximum.at(depth, pixels, near)
-    front = near == depth[pixels]
+    depths = np.einsum("pk,pk->p", weights, view[surface.faces[faces], 2]) + surface.lift
+    np.maximum.at(depth, pixels, depths)
+    front = depths == depth[pixels]
     pixels, corners, weights = pixels[front], surface.faces[faces[front]], weights[front, :, None]
     normals = (weights * vertex_normals(view, surface.faces)[corners]).sum(axis=1)
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
@@ -122,13 +122,14 @@ def _covered(corners: np.ndarray, w: int, h: int) -> tuple[np.ndarray, np.ndarra
     weights: list[np.ndarray] = []
     for slope, start in zip(slopes, starts):
         weight = start[triangle] + slope[triangle, 0] * x + slope[triangle, 1] * y
-        within = weight >= 0.0
-        triangle, x, y = triangle[within], x[within], y[within]
-        weights = [one[within] for one in (*weights, weight)]
+        inside = weight >= 0.0
+        triangle, x, y = triangle[inside], x[inside], y[inside]
+        weights = [one[inside] for one in (*weights, weight)]
     weights.insert(0, 1.0 - weights[0] - weights[1])
-    left = weights[0] >= 0.0
-    triangle, x, y = triangle[left], x[left] + low[triangle[left], 0], y[left] + low[triangle[left], 1]
-    return y * w + x, faces[triangle], np.stack([weight[left] for weight in weights], axis=1)
+    inside = weights[0] >= 0.0
+    triangle = triangle[inside]
+    x, y = x[inside] + low[triangle, 0], y[inside] + low[triangle, 1]
+    return y * w + x, faces[triangle], np.stack([weight[inside] for weight in weights], axis=1)
 
 
 INERTIA = "energy/inertia"
@@ -170,9 +171,9 @@ class SceneRollOuts:
         return first + int(np.argmax(lively)), "where the first one's inertia term is largest"
 
 
-def camera_path(selected: SceneRollOuts, axes: np.ndarray) -> tuple[np.ndarray, float]:
+def camera_path(group: SceneRollOuts, axes: np.ndarray) -> tuple[np.ndarray, float]:
     """Return the camera's target in each frame (T,3) [m], smoothed, and half the height that it sees [m]."""
-    cloths = selected.series.values()
+    cloths = group.series.values()
     frames = max(cloth.frames for cloth in cloths)
     paths = [cloth.positions @ axes for cloth in cloths]
     low, high = (
@@ -180,7 +181,7 @@ def camera_path(selected: SceneRollOuts, axes: np.ndarray) -> tuple[np.ndarray, 
         for corners in ([x.min(axis=1) for x in paths], [x.max(axis=1) for x in paths])
     )
     lowest, highest = np.min(low, axis=0), np.max(high, axis=0)
-    dt = selected.longest.dt
+    dt = group.longest.dt
     reach = 0 if np.isnan(dt) else int(SMOOTHED / dt / 2.0)
     centres = uniform_filter1d((lowest + highest) / 2.0, 2 * reach + 1, axis=0, mode="nearest")
     right, up, _ = np.maximum(highest - centres, centres - lowest).max(axis=0)
@@ -193,20 +194,20 @@ def drawn(mesh: Trajectory, frame: int, colour: tuple[float, float, float], lift
 
 
 def draw_frames(
-    selected: SceneRollOuts, width: int, azimuth: float, frames: Iterable[int] | None = None
+    group: SceneRollOuts, width: int, azimuth: float, frames: Iterable[int] | None = None
 ) -> Iterator[np.ndarray]:
     """Yield these frames of the film, or all: views of `width` [pixels] with their names, and the time."""
     width, height = width - width % 2, round(width * TALL / 2) * 2
-    centres, half = camera_path(selected, camera_axes(-azimuth))
-    for frame in range(selected.longest.frames) if frames is None else frames:
-        body = drawn(selected.body, frame, BODY_COLOUR) if selected.body else None
-        cloths = [drawn(cloth, frame, CLOTH_COLOUR, LIFT) for cloth in selected.series.values()]
+    centres, half = camera_path(group, camera_axes(-azimuth))
+    for frame in range(group.longest.frames) if frames is None else frames:
+        body = drawn(group.body, frame, BODY_COLOUR) if group.body else None
+        cloths = [drawn(cloth, frame, CLOTH_COLOUR, LIFT) for cloth in group.series.values()]
         camera = Camera(centres[frame], 2.0 * half, -azimuth)
         pictures = (255.0 * np.array(views(body, cloths, camera, width, height))).astype(np.uint8)
-        yield _composed(selected, pictures, frame, float(selected.longest.times[frame]))
+        yield _composed(group, pictures, frame, float(group.longest.times[frame]))
 
 
-def _composed(selected: SceneRollOuts, pictures: np.ndarray, frame: int, time: float) -> np.ndarray:
+def _composed(group: SceneRollOuts, pictures: np.ndarray, frame: int, time: float) -> np.ndarray:
     """Compose pictures (N,H,W,3) in rows, each under its method's name, with the time [s] below them."""
     from matplotlib import get_data_path
     from PIL import Image, ImageDraw, ImageFont
@@ -219,10 +220,10 @@ def _composed(selected: SceneRollOuts, pictures: np.ndarray, frame: int, time: f
     room = 2 * letter
     image = Image.new("RGB", (columns * width, rows * (height + room) + room), PAPER)
     draw = ImageDraw.Draw(image)
-    for place, (method, cloth) in enumerate(selected.series.items()):
+    for place, (method, cloth) in enumerate(group.series.items()):
         x, y = place % columns * width, place // columns * (height + room)
         image.paste(Image.fromarray(pictures[place]), (x, y + room))
-        texts = {y + room / 2: selected.labels[method]}
+        texts = {y + room / 2: group.labels[method]}
         if frame >= cloth.frames:
             texts[y + room + height - letter] = f"ended at {cloth.times[-1]:.2f} s: {cloth.status}"
         for line, text in texts.items():
@@ -240,8 +241,8 @@ def side_by_side(run: Run) -> Drawing | None:
     """
     rows = run.garment_rows
     for scene in [scene for scenes in run.garments(rows).values() for scene in scenes]:
-        if selected := _whole(run, scene):
-            return _still(selected, *selected.lively_frame())
+        if group := _whole(run, scene):
+            return _still(group, *group.lively_frame())
     return None
 
 
@@ -261,11 +262,11 @@ def worst_frame(run: Run) -> Drawing | None:
         return None
     above = (totals[network] - totals[run.reference]).dropna()
     scene, seconds = above.idxmax()
-    if not (selected := _whole(run, scene)):
+    if not (group := _whole(run, scene)):
         return None
-    frame = int(np.argmin(np.abs(selected.longest.times - seconds)))
-    why = f"where {run.label(network)} has most energy above the reference"
-    return _still(selected, frame, f"{why}, {above.max():.2g} J", "worst_frame")
+    frame = int(np.argmin(np.abs(group.longest.times - seconds)))
+    reason = f"where {run.label(network)} has most energy above the reference"
+    return _still(group, frame, f"{reason}, {above.max():.2g} J", "worst_frame")
 
 
 def _whole(run: Run, scene: str) -> SceneRollOuts | None:
@@ -274,20 +275,20 @@ def _whole(run: Run, scene: str) -> SceneRollOuts | None:
     rows = rows[(rows["metric"] == "energy/total") & (rows["scene"] == scene)]
     seeds = shown_seeds(rows).get(scene, {})
     cloths = {name: run.roll_outs.cloth(scene, name, int(seeds[name])) for name in leads(run, rows)}
-    most = max((cloth.frames for cloth in cloths.values() if cloth), default=0)
-    whole = {name: cloth for name, cloth in cloths.items() if cloth and cloth.frames == most}
-    labels = {name: run.label(name) for name in whole}
-    return SceneRollOuts(scene, whole, run.roll_outs.body(scene), labels) if whole else None
+    frames = max((cloth.frames for cloth in cloths.values() if cloth), default=0)
+    series = {name: cloth for name, cloth in cloths.items() if cloth and cloth.frames == frames}
+    labels = {name: run.label(name) for name in series}
+    return SceneRollOuts(scene, series, run.roll_outs.body(scene), labels) if series else None
 
 
-def _still(selected: SceneRollOuts, frame: int, why: str, name: str = "") -> Drawing:
-    width = PAGE_WIDTH / min(len(selected.series), PER_ROW) * DOTS
-    (image,) = draw_frames(selected, round(min(width, WIDEST * DOTS)), AZIMUTH, [frame])
+def _still(group: SceneRollOuts, frame: int, reason: str, name: str = "") -> Drawing:
+    width = PAGE_WIDTH / min(len(group.series), PER_ROW) * DOTS
+    (image,) = draw_frames(group, round(min(width, WIDEST * DOTS)), AZIMUTH, [frame])
     high, wide = image.shape[:2]
     figure = new_figure(wide / DOTS, high / DOTS)
     figure.set_layout_engine("none")
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.imshow(image, interpolation="none")
     axes.set_axis_off()
-    caption = f"{scene_in_words(selected.scene)}: frame {frame}, {why}."
-    return Drawing(figure, name or f"frames_{file_name(selected.scene)}", caption, vector=False)
+    caption = f"{scene_in_words(group.scene)}: frame {frame}, {reason}."
+    return Drawing(figure, name or f"frames_{file_name(group.scene)}", caption, vector=False)

@@ -68,14 +68,13 @@ def side(metric: Metric, before: float, after: float, difference: float) -> str:
     return WORSE if abs(after - best) > abs(before - best) else BETTER
 
 
-def size_of(metric: Metric, mean: Mean, new: Mean, far: Effect, p: float | None) -> str:
+def size_of(metric: Metric, mean: Mean, new: Mean, shift: Effect, p: float | None) -> str:
     """Return a change as "0.21 ± 0.010 -> 0.26 ± 0.010 J, × 1.24 (1.20 to 1.28), p 0.0030"."""
     before, after = (with_spread(m.value, m.spread_or_uncertainty) for m in (mean, new))
-    text = (
-        f"{before} -> {after}{_unit(metric)}, {'×' if far.scale == RATIO else 'by'} {number(far.shown)}"
-    )
-    if far.interval:
-        text += f" ({' to '.join(number(end) for end in far.interval)})"
+    sign = "×" if shift.scale == RATIO else "by"
+    text = f"{before} -> {after}{_unit(metric)}, {sign} {number(shift.shown)}"
+    if shift.interval:
+        text += f" ({' to '.join(number(end) for end in shift.interval)})"
     return text + ("" if p is None else f", p {number(p, 2)}")
 
 
@@ -83,7 +82,7 @@ def _unit(metric: Metric) -> str:
     return "" if metric.unit == "1" else f" {metric.unit}"
 
 
-def within_tolerance(metric: Metric, mean: Mean, new: Mean, far: Effect, scale: float) -> bool:
+def within_tolerance(metric: Metric, mean: Mean, new: Mean, shift: Effect, scale: float) -> bool:
     """Return whether a change of means is too small to be one.
 
     scale: the median method's value there; unit of a difference whose unit is unknown.
@@ -91,9 +90,9 @@ def within_tolerance(metric: Metric, mean: Mean, new: Mean, far: Effect, scale: 
     if abs(new.value - mean.value) <= FLOOR * scale:
         return True
     share = tolerance_of(metric)
-    if far.scale == DIFFERENCE:
-        return abs(far.value) <= share * (far.unit or scale)
-    return max(far.shown, 1.0 / far.shown) <= 1.0 + share if far.shown > 0.0 else False
+    if shift.scale == DIFFERENCE:
+        return abs(shift.value) <= share * (shift.unit or scale)
+    return max(shift.shown, 1.0 / shift.shown) <= 1.0 + share if shift.shown > 0.0 else False
 
 
 ODD = 3.0  # times the median scatter of scenes, beyond which a scene is left out of the pooled scatter
@@ -116,11 +115,11 @@ def changed_scenes(one: pd.DataFrame, other: pd.DataFrame, metrics: dict[str, Me
     spreads = max(float(stats.norm.isf(level / 10.0)), SPREADS)
     groups = frame.groupby(NETWORK_METRIC, sort=False)
     rows = pd.concat([_differences(metrics[name], of_group, spreads) for (_, name), of_group in groups])
-    beyond = rows["error"] * stats.t.isf(level, rows["freedom"])
-    rows = rows[rows["far"].abs() > np.maximum(rows["least"], beyond)]
+    margin = rows["error"] * stats.t.isf(level, rows["freedom"])
+    rows = rows[rows["shift"].abs() > np.maximum(rows["limit"], margin)]
     return [
         Change(
-            side(metrics[row.metric], row.before, row.after, row.far), row.scene, row.method, row.metric,
+            side(metrics[row.metric], row.before, row.after, row.shift), row.scene, row.method, row.metric,
             f"{number(row.before)} -> {number(row.after)}{_unit(metrics[row.metric])}",
         )
         for row in rows.itertuples()
@@ -130,8 +129,8 @@ def changed_scenes(one: pd.DataFrame, other: pd.DataFrame, metrics: dict[str, Me
 def _differences(metric: Metric, rows: pd.DataFrame, spreads: float) -> pd.DataFrame:
     """Return for each scene of one method the difference of the later run from the earlier.
 
-    before, after: means over seeds. far: the difference on the scale, of logarithms where all values are
-    positive, else plain. least: the largest one on that scale that is no change, at least `spreads` times
+    before, after: means over seeds. shift: the difference on the scale, of logarithms where all values are
+    positive, else plain. limit: the largest one on that scale that is no change, at least `spreads` times
     the noise. error: its standard error, 0 without seeds. freedom: degrees of freedom of the error.
     """
     values, run = rows["value"].to_numpy(), rows["run"].to_numpy()
@@ -151,19 +150,19 @@ def _differences(metric: Metric, rows: pd.DataFrame, spreads: float) -> pd.DataF
     draws = pd.factorize(rows["seed"] * 2 + run)[0]
     scatter, freedom = _scatter(scaled - np.stack([before, after])[run, places], places, draws)
     median = float(np.median(np.abs(old)))
-    moved = spreads * np.hypot(*means_of(rows["uncertainty"].fillna(0.0).to_numpy()))
+    noise = spreads * np.hypot(*means_of(rows["uncertainty"].fillna(0.0).to_numpy()))
     share = tolerance_of(metric)
     if positive:
-        least = np.maximum(math.log1p(share), np.log1p((FLOOR * median + moved) / old))
+        limit = np.maximum(math.log1p(share), np.log1p((FLOOR * median + noise) / old))
     else:
         unit = 100.0 if relative else np.maximum(np.abs(old), median)
-        least = np.maximum(np.maximum(share * unit, FLOOR * median), moved)
+        limit = np.maximum(np.maximum(share * unit, FLOOR * median), noise)
     # On a scale of logarithms a fall by as much is farther than a rise.
-    least = np.where(np.abs(new - old) <= moved, np.inf, least)
+    limit = np.where(np.abs(new - old) <= noise, np.inf, limit)
     error = scatter * np.sqrt((1.0 / counts).reshape(-1, 2).sum(axis=1))
     return pd.DataFrame({
         "scene": scenes, "method": rows["method"].iloc[0], "metric": metric.name, "before": old, "after": new,
-        "far": after - before, "least": least, "error": error, "freedom": freedom,
+        "shift": after - before, "limit": limit, "error": error, "freedom": freedom,
     })  # fmt: skip
 
 
@@ -185,8 +184,9 @@ def _scatter(residuals: np.ndarray, places: np.ndarray, draws: np.ndarray) -> tu
         pool = freedom > 0
     total = float(freedom[pool].sum())
     pooled = float(squares[pool].sum()) / total
-    scenes, kept = int(pool.sum()), pool[places]
-    of_draws = np.bincount(draws[kept], residuals[kept]) / np.maximum(np.bincount(draws[kept]), 1)
+    scenes, in_pool = int(pool.sum()), pool[places]
+    numbers = draws[in_pool]
+    of_draws = np.bincount(numbers, residuals[in_pool]) / np.maximum(np.bincount(numbers), 1)
     common = float((of_draws**2).sum()) / (draws.max() - 1)
     rho = (scenes * common / pooled - 1.0) / (scenes - 1) if scenes > 1 else 0.0
     total /= 1.0 + (scenes - 1) * min(max(rho, 0.0), 1.0) ** 2

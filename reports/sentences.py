@@ -29,8 +29,8 @@ def headline(run: Run) -> list[tuple[str, str]]:
 
 @lru_cache(maxsize=4)
 def _measured(run: Run) -> dict[str, str]:
-    worn = run.garment_rows[run.garment_rows["garment"] == run.first_garment]
-    rows = with_relative_excess(run, worn)
+    rows = run.garment_rows[run.garment_rows["garment"] == run.first_garment]
+    rows = with_relative_excess(run, rows)
     return {
         "Verdict": verdict(run, rows),
         FELL: _fallen(run, rows),
@@ -46,9 +46,9 @@ def _fallen(run: Run, rows: pd.DataFrame) -> str:
     """Name the methods with roll-outs that have less energy than any garment that is worn."""
     rows = rows[rows["metric"] == RELATIVE_EXCESS.name]
     names = [
-        f"{run.label(name)} ({len(kept) - kept.sum()} of {len(kept)} roll-outs)"
-        for name, kept in rows.groupby("method", observed=True)["usable"]
-        if not kept.all()
+        f"{run.label(name)} ({len(usable) - usable.sum()} of {len(usable)} roll-outs)"
+        for name, usable in rows.groupby("method", observed=True)["usable"]
+        if not usable.all()
     ]
     return f"{', '.join(names)}." if names else ""
 
@@ -67,13 +67,13 @@ def _trained(run: Run, rows: pd.DataFrame) -> str:
     return f"Relative excess as trained in this run: {'; '.join(texts)}." if texts else ""
 
 
-def verdict(run: Run, worn: pd.DataFrame) -> str:
+def verdict(run: Run, frame: pd.DataFrame) -> str:
     """Say what one method has of skinning's excess energy, in which time, and how its dynamics are.
 
     It is the user's own, or else the first network of page one that these rows have.
     """
-    names = [name for name in leads(run, worn) if run.methods[name].role in (*LEARNED, EXTERNAL)]
-    rows = with_relative_excess(run, worn)
+    names = [name for name in leads(run, frame) if run.methods[name].role in (*LEARNED, EXTERNAL)]
+    rows = with_relative_excess(run, frame)
     excesses = {name: excess for name in names if (excess := excess_of(run, rows, name))}
     if not excesses:
         return ""
@@ -90,8 +90,8 @@ def verdict(run: Run, worn: pd.DataFrame) -> str:
     text += f" ({number(excess.pooled, 2)} % summed over all motions)" if len(scenes) > 1 else ""
     if times := _times_faster(run, name):
         text += f", and is more than {times} times faster than the simulation"
-    if (alike := value_of(worn, name, ALIKE)) is not None:
-        text += f"; the dynamics of its hem {likeness(alike)} the simulation's"
+    if (correlation := value_of(frame, name, ALIKE)) is not None:
+        text += f"; the dynamics of its hem {likeness(correlation)} the simulation's"
     return f"{text}{excess.fewer}."
 
 
@@ -99,10 +99,10 @@ def _times_faster(run: Run, name: str) -> int:
     """Return to one digit how many times as long the reference takes; 0 where that is unknown."""
     timed, _ = timed_rows(run, run.garment_rows)
     metric = run.metrics.get(run_time(timed))
-    faster = compare_methods(run, timed, metric, run.reference, name).effect if metric else None
-    least = min(faster.interval or (faster.shown,)) if faster else 0.0
-    power = 10 ** math.floor(math.log10(least)) if least > 1.0 else 1
-    return power * math.floor(least / power)  # one digit: the simulation is timed once
+    effect = compare_methods(run, timed, metric, run.reference, name).effect if metric else None
+    bound = min(effect.interval or (effect.shown,)) if effect else 0.0
+    power = 10 ** math.floor(math.log10(bound)) if bound > 1.0 else 1
+    return power * math.floor(bound / power)  # one digit: the simulation is timed once
 
 
 def likeness(correlation: float) -> str:
@@ -121,13 +121,13 @@ def _kind(run: Run, scenes: Collection[str]) -> str:
 
 def _certainty(run: Run) -> str:
     """Say which primary claims hold, with one seed also which hold in the published run."""
-    counted_claims = counts(judged(run))
-    if not counted_claims:
+    verdicts = counts(judged(run))
+    if not verdicts:
         return ""
-    tests = f"{counted_claims.total()} test{'' if counted_claims.total() == 1 else 's'}"
+    tests = f"{verdicts.total()} test{'' if verdicts.total() == 1 else 's'}"
     published = published_verdicts() if run.frame["seed"].nunique() == 1 else ""
-    beside = f" with one seed; in the published run {published}" if published else ""
-    return f"Of {tests} of primary claims of the paper {in_words(counted_claims)}{beside}."
+    remark = f" with one seed; in the published run {published}" if published else ""
+    return f"Of {tests} of primary claims of the paper {in_words(verdicts)}{remark}."
 
 
 def endings(run: Run) -> str:

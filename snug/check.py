@@ -54,8 +54,8 @@ def describe(garment: Garment, body: Body) -> Iterator[tuple[str, str]]:
     yield "pieces", f"{piece_of_faces(faces).max() + 1}"
     yield "smallest angle", f"{np.degrees(corner_angles(positions, faces).min()):.1f} degrees"
     yield "size", " x ".join(f"{length:.2f}" for length in np.ptp(positions, axis=0)) + " m"
-    below, depth = np.mean(distances < 0), max(0.0, -distances.min())
-    yield "below the skin", f"{below:.1%} of the vertices, the deepest by {1e3 * depth:.1f} mm"
+    share, depth = np.mean(distances < 0), max(0.0, -distances.min())
+    yield "below the skin", f"{share:.1%} of the vertices, the deepest by {1e3 * depth:.1f} mm"
     if garment.rest_uv is not None:
         strain = np.abs(stretches(positions[faces], garment.rest_uv) - 1).max()
         yield "UV chart", f"stretched by up to {strain:.0%} on the mesh"

@@ -53,8 +53,8 @@ class GarmentFile:
     weld: float = 1e-6
 
     def __post_init__(self) -> None:
-        for name, known in (("units", UNITS), ("up", AXES), ("rest", REST_SHAPES)):
-            _demand_one_of(known, name, getattr(self, name))
+        for name, choices in (("units", UNITS), ("up", AXES), ("rest", REST_SHAPES)):
+            _demand_one_of(choices, name, getattr(self, name))
         if len(self.shift) != 3 or not all(map(_is_number, self.shift)):
             raise ValueError(f"shift={self.shift}: give three numbers [m], as '0 0.1 0'")
         if not _is_number(self.weld) or self.weld <= 0.0:
@@ -105,14 +105,14 @@ class MotionFileOptions:
     def absent(self, motions: Collection[str]) -> str:
         """Return a line on the clips of the split that are not among these motions; empty: all are there."""
         clips = self.clips("test", "train")
-        absent = [clip for clip in clips if clip not in motions]
-        what = f"split {self.split}: {len(absent)} of {len(clips)} clips are absent"
-        return f"{what}: {', '.join(absent)}" if absent else ""
+        gaps = [clip for clip in clips if clip not in motions]
+        title = f"split {self.split}: {len(gaps)} of {len(clips)} clips are absent"
+        return f"{title}: {', '.join(gaps)}" if gaps else ""
 
 
-def _demand_one_of(known: tuple[str, ...], name: str, value: object) -> None:
-    if value not in known:
-        raise ValueError(f"{name}={value}: choose from {', '.join(filter(None, known))}")
+def _demand_one_of(choices: tuple[str, ...], name: str, value: object) -> None:
+    if value not in choices:
+        raise ValueError(f"{name}={value}: choose from {', '.join(filter(None, choices))}")
 
 
 def _is_number(value: object) -> bool:
@@ -165,10 +165,10 @@ def parse_motion_files(text: str) -> tuple[str, MotionFileOptions]:
 
 
 def _made(kind: Any, options: dict[str, Any], text: str) -> Any:
-    known = [field.name for field in fields(kind)]
+    names = [field.name for field in fields(kind)]
     for name in options:
-        if name not in known:
-            raise ValueError(f"{text}: no word is called '{name}'; there are {', '.join(known)}")
+        if name not in names:
+            raise ValueError(f"{text}: no word is called '{name}'; there are {', '.join(names)}")
     try:
         for name in {"path", "material"} & options.keys():
             if not (place := options[name]) or place is True:

@@ -122,7 +122,7 @@ class Recipe:
     spike: float = 2.0
 
     def __post_init__(self) -> None:
-        for option, allowed in (
+        for option, choices in (
             ("pose_input", ("six", "axis_angle")),
             ("velocity_frame", ("root", "world")),
             ("initialisation", INITIALISATIONS),
@@ -133,9 +133,9 @@ class Recipe:
             ("bending", ("length_area", "none")),
             ("shape_of", ("window", "clip")),
         ):
-            if getattr(self, option) not in allowed:
+            if getattr(self, option) not in choices:
                 raise RecipeError(
-                    f"recipe option {option}={getattr(self, option)!r}: use one of {allowed}"
+                    f"recipe option {option}={getattr(self, option)!r}: use one of {choices}"
                 )
         for term in (name for name in self.terms if name not in TERMS):
             try:
@@ -200,12 +200,12 @@ def find_energy(name: str) -> Callable[..., Energy]:
         raise ValueError(f"energy {name!r} is both {' and '.join(fit)}: give yours a name of its own")
     if named:
         raise ValueError(f"energy {name!r} cannot be trained: {_reason_against(named[0])}")
-    known = ", ".join(sorted({term.name for term in terms if not _reason_against(term)}))
-    raise ValueError(f"unknown energy {name!r}: use one of {known}, or import the file of your own")
+    names = ", ".join(sorted({term.name for term in terms if not _reason_against(term)}))
+    raise ValueError(f"unknown energy {name!r}: use one of {names}, or import the file of your own")
 
 
-def _subclasses(of: type[Energy]) -> Iterator[type[Energy]]:
-    for term in of.__subclasses__():
+def _subclasses(base: type[Energy]) -> Iterator[type[Energy]]:
+    for term in base.__subclasses__():
         yield term
         yield from _subclasses(term)
 

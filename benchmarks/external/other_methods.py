@@ -71,13 +71,13 @@ def write_for(method: str, part: Path, scene: BuiltScene) -> None:
 
     Raises ValueError for a scene that has not a posed body in each frame.
     """
-    worn, obstacle, material = scene.dressed, scene.obstacle, scene.cloth.material
-    if worn is None or obstacle is None or len(obstacle.positions) != scene.frames:
+    dressed, obstacle, material = scene.dressed, scene.obstacle, scene.cloth.material
+    if dressed is None or obstacle is None or len(obstacle.positions) != scene.frames:
         raise ValueError(f"--for {method}: it reads a body in each frame, which {scene.name} has not")
     part.mkdir()
     name = scene.name.replace("/", "-")
     if method == "ncs":
-        _write_ncs(part, scene, worn, name)
+        _write_ncs(part, scene, dressed, name)
     else:
         _write_meshes(part, scene, obstacle)
     text = (NCS if method == "ncs" else MESHES).format(
@@ -107,20 +107,20 @@ def _write_meshes(part: Path, scene: BuiltScene, obstacle: Obstacle) -> None:
     write_obj(part / "garment.obj", scene.start, cloth.faces)
 
 
-def _write_ncs(part: Path, scene: BuiltScene, worn: Dressed, name: str) -> None:
-    body, motion, garment, material = worn.body, worn.motion, worn.garment, scene.cloth.material
+def _write_ncs(part: Path, scene: BuiltScene, dressed: Dressed, name: str) -> None:
+    body, motion, garment, material = dressed.body, dressed.motion, dressed.garment, scene.cloth.material
     models, data = part / "body_models" / name, part / "data" / name
     configs, lists = part / "ncs" / "configs", part / "ncs" / "dataset" / "txt" / name
     for folder in (models, data, lists, configs):
         folder.mkdir(parents=True)
     single: dict[str, Any] = {  # ncs/model/body.py:18-23; vertices and rest pose: float32
-        "vertices": body.shaped(worn.betas), "blend_weights": body.skinning_weights,
-        "joints": body.joints(worn.betas), "rest_pose": np.zeros((len(body.parents), 3)),
+        "vertices": body.shaped(dressed.betas), "blend_weights": body.skinning_weights,
+        "joints": body.joints(dressed.betas), "rest_pose": np.zeros((len(body.parents), 3)),
     }  # fmt: skip
     single = {key: array.astype(np.float32) for key, array in single.items()}
     np.savez(models / "body.npz", faces=body.faces, parents=body.parents, **single)
     # ncs/utils/IO.py:26-36; ncs/model/cloth.py:52-54.
-    write_obj(models / "garment.obj", garment.rest_for(body, worn.betas), scene.cloth.faces)
+    write_obj(models / "garment.obj", garment.rest_for(body, dressed.betas), scene.cloth.faces)
     if len(scene.cloth.pins):
         np.save(models / "garment_pin.npy", scene.cloth.pins)
     # ncs/dataset/sequence.py:9-12; ncs/dataset/data.py:22-24, 36-39; rate of answers: 91-96.
@@ -133,9 +133,9 @@ def _write_ncs(part: Path, scene: BuiltScene, worn: Dressed, name: str) -> None:
     joints = {*range(7), 9, 12, 13, 14, *range(16, 20), *bearing}
     files = {"train": "train.txt", "validation": "test.txt", "test": "test.txt"}
     loss = {"type": "stvk", "lambda_": material.lame_lambda / 2, "mu": material.lame_mu / 2}
-    further = {"bending": 2 * material.bending_stiffness, "density": material.areal_density}
+    terms = {"bending": 2 * material.bending_stiffness, "density": material.areal_density}
     settings = {
         "body": {"model": name, "input_joints": sorted(joints)}, "garment": {"name": "garment"},
-        "data": {"dataset": name, **files, "fps": 1.0 / scene.dt}, "loss": {"cloth": loss, **further},
+        "data": {"dataset": name, **files, "fps": 1.0 / scene.dt}, "loss": {"cloth": loss, **terms},
     }  # fmt: skip
     (configs / f"{name}.json").write_text(json.dumps(settings, indent=1), encoding="utf-8")

@@ -55,9 +55,9 @@ class RollOutOption:
     role: str = "external"  # of the method
 
     def __post_init__(self) -> None:
-        for what, number in (("fps", self.fps), ("ms", self.ms)):
+        for field, number in (("fps", self.fps), ("ms", self.ms)):
             if number is not None and not 0.0 < number < 1e9:
-                raise RollOutFileError(f"{what}={number}: give a positive number")
+                raise RollOutFileError(f"{field}={number}: give a positive number")
         if not re.fullmatch(rf"\w[{CHARACTERS}]*", self.name):
             raise RollOutFileError(
                 f"{self.path}: the name '{self.name}' has other than letters, digits and _-+., or "
@@ -78,11 +78,11 @@ def parse_roll_out(text: str, *, named: bool = True) -> tuple[str, dict[str, Any
     >>> parse_roll_out("mine=out.npz,units=cm,ms=2.2")
     ('mine', {'path': 'out.npz', 'units': 'cm', 'ms': 2.2})
     """
-    given, options = split_words(text)
-    name, equals, path = (part.strip() for part in given.partition("="))
+    locator, options = split_words(text)
+    name, equals, path = (part.strip() for part in locator.partition("="))
     if not (named or equals):
-        stem = Path(given.rstrip("/").replace(PLACE, "")).stem
-        name, path = re.sub(rf"[^{CHARACTERS}]+", "-", stem).strip("_-+.") or "roll-out", given
+        stem = Path(locator.rstrip("/").replace(PLACE, "")).stem
+        name, path = re.sub(rf"[^{CHARACTERS}]+", "-", stem).strip("_-+.") or "roll-out", locator
     if not (name and path):
         raise RollOutFileError(f"{text}: give NAME=FILE, with ,units=cm and the like behind it")
     return name, {"path": path, **options}
@@ -123,30 +123,31 @@ def read_roll_out(path: str | Path) -> StoredRollOut:
     try:
         return _checked(_READERS.get(suffix, _meshes)(path))
     except Exception as error:  # a damaged file fails in nearly every way
-        why = " ".join(str(error).split())[:300] or type(error).__name__
-        raise RollOutFileError(why if path in why else f"{path}: {why}") from None
+        reason = " ".join(str(error).split())[:300] or type(error).__name__
+        raise RollOutFileError(reason if path in reason else f"{path}: {reason}") from None
 
 
 def _checked(arrays: Mapping[str, Any]) -> StoredRollOut:
     """Return the arrays, their shapes compared. Raises ValueError, without the file's name."""
-    given = {name: np.asarray(array) for name, array in arrays.items() if array is not None}
-    if "positions" not in given:
+    arrays = {name: np.asarray(array) for name, array in arrays.items() if array is not None}
+    if "positions" not in arrays:
         raise ValueError(
             "holds no positions (T,V,3): name them 'positions' in an npz, 'pred' in a pickle"
         )
-    known = {name: _floats(name, given[name]) for name in OVER_TIME if name in given}
-    shape = known["positions"].shape
-    for name, array in known.items():
-        if len(array) != len(known["positions"]) or (name == "quasi_static" and array.shape != shape):
+    series = {name: _floats(name, arrays[name]) for name in OVER_TIME if name in arrays}
+    shape = series["positions"].shape
+    for name, array in series.items():
+        if len(array) != len(series["positions"]) or (name == "quasi_static" and array.shape != shape):
             raise ValueError(f"{name} is {array.shape}, positions {shape}")
-    for name, of in FACES.items():
-        if name in given:
-            known[name] = _triangles(name, given[name], known[of].shape[1] if of in known else np.inf)
-    fps = float(given["fps"].item()) if "fps" in given else None
+    for name, mesh in FACES.items():
+        if name in arrays:
+            count = series[mesh].shape[1] if mesh in series else np.inf
+            series[name] = _triangles(name, arrays[name], count)
+    fps = float(arrays["fps"].item()) if "fps" in arrays else None
     if fps is not None and not 0.0 < fps < 1e6:
         raise ValueError(f"states {fps} frames per second")
-    dtype = str(given["positions"].dtype.newbyteorder("="))
-    return StoredRollOut(dtype=dtype, fps=fps, converged=given.get("converged"), **known)
+    dtype = str(arrays["positions"].dtype.newbyteorder("="))
+    return StoredRollOut(dtype=dtype, fps=fps, converged=arrays.get("converged"), **series)
 
 
 def _floats(name: str, array: np.ndarray) -> np.ndarray:
@@ -158,9 +159,9 @@ def _floats(name: str, array: np.ndarray) -> np.ndarray:
 def _triangles(name: str, array: np.ndarray, vertices: float) -> np.ndarray:
     if array.ndim != 2 or array.shape[1] != 3 or array.dtype.kind not in "iu" or not len(array):
         raise ValueError(f"{name} is {array.dtype} {array.shape}: whole numbers of shape (triangles, 3)")
-    wrong = array[(array < 0) | (array >= vertices)]
-    if len(wrong):
-        raise ValueError(f"{name} names vertex {wrong[0]} of {vertices}")
+    strays = array[(array < 0) | (array >= vertices)]
+    if len(strays):
+        raise ValueError(f"{name} names vertex {strays[0]} of {vertices}")
     return array.astype(np.int64)
 
 
@@ -251,26 +252,24 @@ def _check_place(positions: np.ndarray, expected: np.ndarray, *, ordered: bool) 
     if not np.isfinite(first).all():
         raise RollOutFileError("its first frame, the scene's start, is not finite")
     if ordered:
-        apart = float(np.median(np.linalg.norm(first - expected[0], axis=1)))
+        gap = float(np.median(np.linalg.norm(first - expected[0], axis=1)))
     else:
-        apart = max(
-            np.abs(end(first, axis=0) - end(expected[0], axis=0)).max() for end in (np.min, np.max)
-        )
-    if not apart <= FIRST * size:
-        across = float(np.linalg.norm(np.ptp(first, axis=0)))
+        gap = max(np.abs(end(first, axis=0) - end(expected[0], axis=0)).max() for end in (np.min, np.max))
+    if not gap <= FIRST * size:
+        width = float(np.linalg.norm(np.ptp(first, axis=0)))
         raise RollOutFileError(
-            f"its first frame is {across:.3g} m across and lies {apart:.3g} m from the scene's cloth, which "
+            f"its first frame is {width:.3g} m across and lies {gap:.3g} m from the scene's cloth, which "
             f"is {size:.3g} m across: write metres, y up (or say units=cm, up=z), world coordinates, and the "
             "vertices in the order of the scene's mesh"
         )
     frames = min(len(positions), len(expected))
     with np.errstate(over="ignore", invalid="ignore"):
-        away = np.linalg.norm(positions[:frames].mean(axis=1) - expected[:frames].mean(axis=1), axis=1)
-    far = np.flatnonzero(~(away <= FARTHEST * size))
-    if 2 * len(far) > frames:
+        offsets = np.linalg.norm(positions[:frames].mean(axis=1) - expected[:frames].mean(axis=1), axis=1)
+    strays = np.flatnonzero(~(offsets <= FARTHEST * size))
+    if 2 * len(strays) > frames:
         raise RollOutFileError(
-            f"from frame {far[0]} on its centre lies {away[far[0]]:.2g} m from where the body carries it: "
-            "another motion, another frame rate, or coordinates that are not the world's"
+            f"from frame {strays[0]} on its centre lies {offsets[strays[0]]:.2g} m from where the body "
+            "carries it: another motion, another frame rate, or coordinates that are not the world's"
         )
 
 

@@ -66,7 +66,7 @@ NOT_SCORED = "The scene is for networks of benchmarks.run alone: no roll-out of 
 
 def write_scene_files(part: Path, scene: BuiltScene, facts: dict[str, Any]) -> None:
     """Write arrays, meshes and the facts, as scene.json, into a folder; README names each file's content."""
-    cloth, obstacle, worn = scene.cloth, scene.obstacle, scene.dressed
+    cloth, obstacle, dressed = scene.cloth, scene.obstacle, scene.dressed
     write_obj(part / "rest.obj", cloth.rest_positions, cloth.faces, cloth.rest_uv)
     pinned = scene.pin_positions
     _write_arrays(
@@ -82,10 +82,10 @@ def write_scene_files(part: Path, scene: BuiltScene, facts: dict[str, Any]) -> N
     if obstacle is not None:
         _write_arrays(
             part / "obstacle.npz", positions=obstacle.positions, faces=obstacle.faces, fps=1.0 / scene.dt,
-            rest_positions=None if worn is None else worn.body.shaped(worn.betas),
+            rest_positions=None if dressed is None else dressed.body.shaped(dressed.betas),
         )  # fmt: skip
-    if worn is not None:
-        write_motion(part, worn)
+    if dressed is not None:
+        write_motion(part, dressed)
     (part / "scene.json").write_text(json.dumps(facts, indent=2) + "\n", encoding="utf-8")
 
 
@@ -94,14 +94,14 @@ def _write_arrays(path: Path, **arrays: Any) -> None:
     np.savez(path, **{name: array for name, array in arrays.items() if array is not None})
 
 
-def write_motion(part: Path, worn: Dressed) -> None:
+def write_motion(part: Path, dressed: Dressed) -> None:
     """Write the poses, and the skinning of the garment."""
     from snug.networks.dressed_body import DressedBody
     from snug.recipe import DEFAULT
 
-    body, motion, garment, before = worn.body, worn.motion, worn.garment, worn.before
-    joints, frames = body.joints(worn.betas), motion.frames
-    betas = np.zeros(body.shape_count) if worn.betas is None else np.asarray(worn.betas)
+    body, motion, garment, before = dressed.body, dressed.motion, dressed.garment, dressed.before
+    joints, frames = body.joints(dressed.betas), motion.frames
+    betas = np.zeros(body.shape_count) if dressed.betas is None else np.asarray(dressed.betas)
     _write_arrays(
         part / "motion_smpl.npz", poses=motion.poses.reshape(frames, -1), trans=motion.translations,
         betas=betas, fps=motion.fps,
@@ -111,8 +111,8 @@ def write_motion(part: Path, worn: Dressed) -> None:
     smoothed = DressedBody(body, garment).weights(DEFAULT.smoothing).double().numpy()
     _write_arrays(
         part / "skinning.npz", weights=garment.skinning_weights, smoothed_weights=smoothed,
-        rest_positions=garment.rest_for(body, worn.betas), joints=joints, parents=body.parents,
-        transforms=body.transforms(motion.poses, motion.translations, worn.betas),
+        rest_positions=garment.rest_for(body, dressed.betas), joints=joints, parents=body.parents,
+        transforms=body.transforms(motion.poses, motion.translations, dressed.betas),
         **{f"loop_{name}": loop for name, loop in garment.loops.items()},
     )  # fmt: skip
 

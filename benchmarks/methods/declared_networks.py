@@ -52,7 +52,7 @@ def network(
         label: its name for people; empty: that of its kind.
         description: one line for --list and run.json.
         base: the method that it is compared with.
-        pairing_group: shared by methods that are compared seed by seed; its own name by default.
+        pairing_group: shared by methods compared seed by seed; its own name by default.
         fields: other fields of MethodEntry, in place of those of a network.
 
     >>> network("snug-windy", "SNUG, windy", "SNUG, trained in a wind", base="snug").reporting.pairing_group

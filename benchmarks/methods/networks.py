@@ -126,11 +126,11 @@ class Network(Method):
         """
         if self.model is None:
             return self.run()
-        still = roll_out(self.model, self.dressed, self.motion, self.betas, quasi_static=True)
+        solution = roll_out(self.model, self.dressed, self.motion, self.betas, quasi_static=True)
         if not self.clean:
-            return still
-        cleaned = [self.clean(x, frame) for frame, x in enumerate(still.positions)]
-        return replace(still, positions=np.stack(cleaned))
+            return solution
+        cleaned = [self.clean(x, frame) for frame, x in enumerate(solution.positions)]
+        return replace(solution, positions=np.stack(cleaned))
 
 
 def make_network(*, models: Path, seed: int, kind: str, cleanup: bool = False) -> Network:

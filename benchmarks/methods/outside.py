@@ -61,7 +61,7 @@ class Stored(Method):
 
     def _trajectory(self, positions: np.ndarray) -> Trajectory:
         stored, bad = self.stored, np.argwhere(~np.isfinite(positions).all(axis=-1))
-        where = f"frame {bad[0, 0]}, vertex {bad[0, 1]}" if len(bad) else ""
+        place = f"frame {bad[0, 0]}, vertex {bad[0, 1]}" if len(bad) else ""
         # Whoever claims nothing is held to nothing where a frame that claims to have converged is judged.
         claims = (
             np.zeros(len(positions)) if stored.converged is None else stored.converged[: len(positions)]
@@ -70,8 +70,8 @@ class Stored(Method):
             positions=positions,
             faces=np.asarray(stored.faces if self.stated.get("other_mesh") else self.scene.cloth.faces),
             times=np.arange(len(positions)) * self.scene.dt,
-            status="diverged" if where else "ok",
-            reason=f"{self.path}: {where}: a position is not finite" if where else "",
+            status="diverged" if place else "ok",
+            reason=f"{self.path}: {place}: a position is not finite" if place else "",
             provenance={"method": "stored roll-out", "file": Path(self.path).name},
             frame_fields={"converged": claims},
         )
@@ -198,8 +198,8 @@ class Program(Stored):
             except OSError as error:
                 raise RuntimeError(f"the program cannot be started: {error}") from None
             except subprocess.TimeoutExpired:
-                why = f"the program was ended after {self.seconds:g} s{_last_line(output)}"
-                raise WorkerDied(why, "timeout") from None
+                reason = f"the program was ended after {self.seconds:g} s{_last_line(output)}"
+                raise WorkerDied(reason, "timeout") from None
         if status:
             raise RuntimeError(f"the program has ended with status {status}{_last_line(output)}")
 

@@ -32,7 +32,7 @@ STATIC = without_inertia(DEFAULT)
 
 
 def energies_of(training: Training) -> Recipe | None:
-    """Return the energies that a network is trained on, as a recipe that is the default in all else.
+    """Return the energies a network is trained on, as a recipe that is the default in all else.
 
     None where these have no minimum, and for a network that learns simulated vertices: energies beside
     these do not make the minimum of its loss, which is zero distance on its training motions and unknown on
@@ -74,15 +74,15 @@ def own_reference(entry: MethodEntry) -> MethodEntry | None:
     energies = own_energies(entry)
     if energies in (None, DEFAULT, STATIC) or is_own_reference(entry):
         return None
-    known = [training.recipe.name for training in TRAININGS.values() if energies_of(training) == energies]
-    name = known[0] if known else f"of-{entry.trained}"
+    names = [training.recipe.name for training in TRAININGS.values() if energies_of(training) == energies]
+    name = names[0] if names else f"of-{entry.trained}"
     static = "inertia" not in energies.terms
     return MethodEntry(
         name=f"simulation-{name}" + "-at-rest" * static,
         label=f"Simulation, {name.replace('-', ' ').replace('pbns', 'PBNS')}" + ", at rest" * static,
         description=f"{'quasi-static solutions' if static else 'the reference'} with the energies of {name}",
         module=MODULE,
-        declared_in="" if known else entry.declared_in,
+        declared_in="" if names else entry.declared_in,
         options={option: getattr(energies, option) for option in OPTIONS},
         needs_body=True,
         timed=False,

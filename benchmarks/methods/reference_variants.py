@@ -26,8 +26,8 @@ def of_own_energies(scene: BuiltScene, recipe: Recipe) -> BuiltScene:
     """
     contact = (make_contact(scene.cloth, recipe),) * (scene.obstacle is not None)
     terms = *static_terms(scene.cloth, recipe).values(), *contact
-    further = scene.minimised[len(scene.energies) :]
-    return replace(scene, energies=terms, minimised=terms + further, settle=lambda: scene.start_state)
+    extras = scene.minimised[len(scene.energies) :]
+    return replace(scene, energies=terms, minimised=terms + extras, settle=lambda: scene.start_state)
 
 
 def of_perturbed_start(scene: BuiltScene, shift: float) -> BuiltScene:

@@ -25,7 +25,7 @@ STATIC: dict[str, Any] = {"dt": 1.0, "quasi_static": True, "tolerance": 1e-4}
 class Simulation(Method):
     """Simulation whose steps are minimised to a tolerance, or stopped after `max_iterations` a step.
 
-    options: of a TimeStepper. change: makes the scene that is simulated from the one that is given.
+    options: of a TimeStepper. change: makes the simulated scene from the given one.
     """
 
     options: dict[str, Any] = field(default_factory=dict)
@@ -35,7 +35,7 @@ class Simulation(Method):
     announced: bool = field(default=False, init=False)
 
     def prepare(self, scene: BuiltScene) -> None:
-        """Settle the start, set the solver up, and compile by two frames that are thrown away."""
+        """Settle the start, set the solver up, and compile by two frames thrown away."""
         self.scene = scene = self.change(scene) if self.change else scene
         # Solvers that stop early are approximations of the declared terms, and a function that makes a
         # minimiser knows no terms that join a step late.

@@ -83,15 +83,15 @@ def given_frames(
     the solver added to the frame before, carried by the skin, is added to each.
     """
     frames: Iterator[np.ndarray]
-    given = np.zeros((0, 3))
+    frame = np.zeros((0, 3))
 
     def guess(step: int, x: np.ndarray) -> np.ndarray:
-        nonlocal frames, given
+        nonlocal frames, frame
         if step == 1:
             frames = start()
-            given = next(frames)  # frame 0 itself is the scene's start, as for every solver
-        before, given = given, next(frames)
-        return given if carry is None else given + SHARE * carry.carried(x - before, step)
+            frame = next(frames)  # frame 0 itself is the scene's start, as for every solver
+        before, frame = frame, next(frames)
+        return frame if carry is None else frame + SHARE * carry.carried(x - before, step)
 
     return guess
 

@@ -51,7 +51,7 @@ def declared(outside: tuple[str, ...] = ()) -> dict[str, Metric]:
 def find_metric(name: str, outside: tuple[str, ...] = ()) -> Metric:
     """Return the declaration of a metric, also by a pattern such as "energy/*". Raises KeyError.
 
-    outside: modules, or paths of files, of metrics that are not the project's.
+    outside: modules, or paths of files, of metrics not the project's.
 
     >>> find_metric("energy/wind").unit
     'J'

@@ -40,11 +40,11 @@ FLAT = 1e-6  # spread of H times the cloth's length: less is round-off
 
 def measure(roll_out: RollOut) -> dict[str, float]:
     """Return mean curvature and change of wrinkles over the evaluated frames; empty without an interior."""
-    judged = roll_out.kept(series_of).part(roll_out.judged)
-    if not judged.area.any():
+    part = roll_out.kept(series_of).part(roll_out.judged)
+    if not part.area.any():
         return {}
-    values = {"curvature/mean": float(judged.means().mean())}
-    change = curvature_change(judged)
+    values = {"curvature/mean": float(part.means().mean())}
+    change = curvature_change(part)
     return values if change is None else values | {"curvature/change": change}
 
 

@@ -93,9 +93,9 @@ def gain_and_lag(moving: Array, static: Array) -> tuple[float, float]:
         if power == 0:
             continue
         gain = float(moving @ shifted) / power
-        left = float(((moving - gain * shifted) ** 2).sum())
-        if gain > 0 and left < best[0]:
-            best = (left, gain, float(lag))
+        error = float(((moving - gain * shifted) ** 2).sum())
+        if gain > 0 and error < best[0]:
+            best = (error, gain, float(lag))
     return best[1], best[2]
 
 
@@ -137,12 +137,12 @@ class HemMotion:
         last = min(len(positions), len(self.simulated), len(self.quasi_static))
         if last - self.first < SHORTEST:
             return {}
-        judged = slice(self.first, last)
+        frames = slice(self.first, last)
         answers = (positions, self.simulated, self.quasi_static)
-        moving, simulated, quiet = (self.of(answer[:last])[judged] for answer in answers)
-        still = quiet if static is None else self.of(static[:last])[judged]
-        part, reference = dynamic_part(moving, still), dynamic_part(simulated, quiet)
-        gain, lag = response(moving, still, self.axes[judged])
+        moving, simulated, quiet = (self.of(answer[:last])[frames] for answer in answers)
+        rest = quiet if static is None else self.of(static[:last])[frames]
+        part, reference = dynamic_part(moving, rest), dynamic_part(simulated, quiet)
+        gain, lag = response(moving, rest, self.axes[frames])
         values = (correlation(part, reference), amplitude(part, reference), gain, lag)
         return {f"dynamics/{name}": v for (name, _), v in zip(HEM, values) if np.isfinite(v)}
 

@@ -62,10 +62,10 @@ def measure(roll_out: RollOut) -> dict[str, float | Estimate]:
 def series(roll_out: RollOut) -> dict[str, NDArray[np.float32]]:
     """Return step/vertices (T,V) [mm]: distance of each vertex to y_t; nan in other than sampled frames."""
     away = roll_out.kept(judge_steps).away
-    shown = np.full(roll_out.positions.shape[:2], np.nan, dtype=np.float32)
+    values = np.full(roll_out.positions.shape[:2], np.nan, dtype=np.float32)
     for frame, distances in away.items():
-        shown[frame] = distances
-    return {"step/vertices": shown} if away else {}
+        values[frame] = distances
+    return {"step/vertices": values} if away else {}
 
 
 def judge_steps(roll_out: RollOut) -> Optimality:
@@ -93,19 +93,19 @@ def gap_scale(group: SceneRollOuts) -> float | None:
 
 @dataclass
 class Optimality:
-    """Numbers of the sampled frames, of `judged` in all; gap/refrozen is of the first of them alone."""
+    """Numbers of the sampled frames, of `frames` in all; gap/refrozen is of the first of them alone."""
 
-    judged: int = 0
+    frames: int = 0
     values: dict[str, list[float]] = field(default_factory=lambda: {name: [] for name in MEANS})
     away: dict[int, Floats] = field(default_factory=dict)  # frame -> (V,) [mm] from y_t
 
     def estimate(self, values: list[float]) -> Estimate:
         """Return the mean and its standard error as a sample of the judged frames; 0 for all of them."""
         count = len(values)
-        if count >= self.judged:
+        if count >= self.frames:
             return Estimate(float(np.mean(values)), 0.0)
-        left = 1.0 - count / self.judged  # correction for a finite population
-        error = float(np.std(values, ddof=1)) * np.sqrt(left / count) if count > 1 else float("nan")
+        correction = 1.0 - count / self.frames  # for a finite population
+        error = float(np.std(values, ddof=1)) * np.sqrt(correction / count) if count > 1 else float("nan")
         return Estimate(float(np.mean(values)), float(error))
 
     def metrics(self) -> dict[str, float | Estimate]:
@@ -133,42 +133,42 @@ def optimality(
     # No scale serves where the reference lies above the first guess, or has no energy.
     negligible = NEGLIGIBLE * scale if scale is not None and scale > 0.0 else 0.0
     frames = _judged(scene, positions)
-    numbers, potential = Optimality(judged=len(frames)), _potential(scene)
+    numbers, potential = Optimality(frames=len(frames)), _potential(scene)
     values = numbers.values
-    minimiser = LBFGS(potential, max_iterations=ITERATIONS)
+    solver = LBFGS(potential, max_iterations=ITERATIONS)
     inner = ~boundary_mask(scene.cloth.faces, scene.cloth.vertex_count)
     for frame in spread_evenly(frames):
         x = np.ascontiguousarray(positions[frame])
         guess = freeze_step(scene, potential, positions, frame)
-        here, gradient = potential.value_and_gradient(x)
-        if not np.isfinite(here):  # no gap to speak of, and no place for a minimiser to start
+        energy, gradient = potential.value_and_gradient(x)
+        if not np.isfinite(energy):  # no gap to speak of, and no place for a minimiser to start
             numbers.values = {name: [np.nan] for name in ("gap/energy", "gap/local", "gradient/norm")}
             numbers.away = {}
             return numbers
-        below = minimiser.minimise(x)
+        minimum = solver.minimise(x)
         # A guess that has no energy, as of a garment that collapsed a frame ago, leads nowhere.
-        minima = (minimiser.minimise(guess).energy, below.energy, here)
-        best = min(energy for energy in minima if np.isfinite(energy))
-        values["gap/energy"].append(here - best)
-        values["gap/local"].append(here - min(here, below.energy))
+        minima = (solver.minimise(guess).energy, minimum.energy, energy)
+        best = min(e for e in minima if np.isfinite(e))
+        values["gap/energy"].append(energy - best)
+        values["gap/local"].append(energy - min(energy, minimum.energy))
         largest = float(np.abs(gradient[scene.cloth.free]).max())
         values["gradient/norm"].append(largest / mean_weight(potential))
-        y = below.positions
+        y = minimum.positions
         numbers.away[frame] = MM * np.linalg.norm(x - y, axis=1)
         values["step/distance"].append(float(np.sqrt((numbers.away[frame] ** 2).mean())))
         if inner.any():
             values["step/curvature"].append(_curvature_error(x, y, scene.cloth.faces, inner))
         if scene.obstacle is not None and len(values["gap/refrozen"]) < samples:
             freeze_step(scene, potential, positions, frame, guess=x)
-            again = potential.value(x)
-            values["gap/refrozen"].append(again - min(again, minimiser.minimise(x).energy))
+            refrozen = potential.value(x)
+            values["gap/refrozen"].append(refrozen - min(refrozen, solver.minimise(x).energy))
         if len(values["gap/energy"]) >= samples and numbers.precise(negligible):
             break
     return numbers
 
 
 def _judged(scene: BuiltScene, positions: Positions) -> range:
-    """Return the frames that are evaluated; none where a frame is not one time step."""
+    """Return the evaluated frames; none where a frame is not one time step."""
     return range(scene.warm_up, len(positions) if scene.substeps == 1 else 0)
 
 

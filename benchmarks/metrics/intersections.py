@@ -45,8 +45,8 @@ def measure_swept(roll_out: RollOut) -> dict[str, float]:
         return {}
     steps = np.unique(np.linspace(0, len(x) - 2, SAMPLED_STEPS).round().astype(int))
     counts = [swept_crossings(x[step], x[step + 1], scene.cloth.faces) for step in steps]
-    known = [count for count in counts if count is not None]
-    return {"intersections/swept": float(np.mean(known))} if len(known) == len(counts) else {}
+    crossings = [count for count in counts if count is not None]
+    return {"intersections/swept": float(np.mean(crossings))} if len(crossings) == len(counts) else {}
 
 
 def swept_crossings(before: Vertices, after: Vertices, faces: Faces) -> int | None:

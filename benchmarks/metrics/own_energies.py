@@ -32,14 +32,14 @@ def measure(roll_out: RollOut) -> dict[str, float]:
     bare = group.scene.skinned
     if bare is not None and (roll_out is group.reference or is_own_reference(roll_out.entry)):
         return {NAME: 0.0}
-    least = None if recipe in (None, DEFAULT) else _least(roll_out, recipe)
-    if bare is None or recipe is None or least is None:
+    minimum = None if recipe in (None, DEFAULT) else _least(roll_out, recipe)
+    if bare is None or recipe is None or minimum is None:
         return {}
     from benchmarks.methods.reference_variants import of_own_energies  # loads torch
 
-    terms = energy_series(of_own_energies(group.scene, recipe), [roll_out.positions, least, bare])
-    series = [of["total"] if "inertia" in recipe.terms else of["total"] - of["inertia"] for of in terms]
-    return _share(series, roll_out.judged_beside(least))
+    terms = energy_series(of_own_energies(group.scene, recipe), [roll_out.positions, minimum, bare])
+    series = [e["total"] if "inertia" in recipe.terms else e["total"] - e["inertia"] for e in terms]
+    return _share(series, roll_out.judged_beside(minimum))
 
 
 def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
@@ -65,12 +65,12 @@ def _of_skinning(group: SceneRollOuts) -> Floats | None:
     return None if bare is None else energy_series(group.scene, [bare])[0]["total"]
 
 
-def _share(series: Sequence[Floats], judged: slice) -> dict[str, float]:
+def _share(series: Sequence[Floats], frames: slice) -> dict[str, float]:
     """Return the excess [%] of a method, from its energies (T,), those of the minimiser and of skinning.
 
     Empty where skinning does not lie above the minimiser: there is no such share.
     """
-    method, minimum, bare = (float(energy[judged].mean()) for energy in series)
+    method, minimum, bare = (float(energy[frames].mean()) for energy in series)
     return {NAME: 100.0 * (method - minimum) / (bare - minimum)} if bare > minimum else {}
 
 

@@ -32,19 +32,19 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
 
 def measure(roll_out: RollOut) -> dict[str, float]:
     """Return shares [%] of vertices and area inside the obstacle and depth [mm] over the evaluated frames."""
-    scene, x, judged = roll_out.scene, roll_out.positions, roll_out.judged
+    scene, x, frames = roll_out.scene, roll_out.positions, roll_out.judged
     if scene.obstacle is None:
         return {}
     inside = inside_of(roll_out)
-    depth = inside.depth[judged]
+    depth = inside.depth[frames]
     values = {
-        "penetration/vertices": 100.0 * float(inside.share[judged].mean()),
-        "penetration/surface": 100.0 * float(inside.area[judged].mean()),
+        "penetration/vertices": 100.0 * float(inside.share[frames].mean()),
+        "penetration/surface": 100.0 * float(inside.area[frames].mean()),
         "penetration/deep": 100.0 * float((depth > DEEP).mean()),
         "penetration/depth_p99": MM * float(np.percentile(depth, 99)),
     }
     if not roll_out.entry.other_mesh:
-        part_depth = own_part_depth(x, scene.obstacle, scene.cloth.rest_positions)[judged]
+        part_depth = own_part_depth(x, scene.obstacle, scene.cloth.rest_positions)[frames]
         values["penetration/own_part_p999"] = MM * float(np.percentile(part_depth, 99.9))
     return values
 
@@ -134,8 +134,8 @@ def penetration(
 
     All trajectories are asked about together at each frame: the obstacle's search tree is made once.
     """
-    samples = [SurfaceSamples(each) for each in faces]
-    penetrations = [
+    samples = [SurfaceSamples(mesh) for mesh in faces]
+    results = [
         Penetration(share=np.empty(len(x)), depth=np.empty(x.shape[:2]), area=np.empty(len(x)))
         for x in trajectories
     ]
@@ -144,15 +144,15 @@ def penetration(
         points = [samples[k].points(trajectories[k][frame]) for k in present]
         distances = np.asarray(obstacle.signed_distance(np.concatenate(points), frame))
         for k, distance in zip(
-            present, np.split(distances, np.cumsum([len(each) for each in points])[:-1])
+            present, np.split(distances, np.cumsum([len(part) for part in points])[:-1])
         ):
             x, inside = trajectories[k][frame], distance < 0.0
             weights = samples[k].weights(x)
-            penetrations[k].depth[frame] = np.maximum(0.0, -distance[: len(x)])
-            penetrations[k].share[frame] = inside[: len(x)].mean()
+            results[k].depth[frame] = np.maximum(0.0, -distance[: len(x)])
+            results[k].share[frame] = inside[: len(x)].mean()
             # Of a cloth drawn together to a point nothing is inside or outside by area.
-            penetrations[k].area[frame] = weights @ inside / max(weights.sum(), np.finfo(float).tiny)
-    return penetrations
+            results[k].area[frame] = weights @ inside / max(weights.sum(), np.finfo(float).tiny)
+    return results
 
 
 def own_part_depth(positions: Positions, obstacle: Obstacle, rest_positions: Vertices) -> Floats:
@@ -173,8 +173,8 @@ def measure_exact(roll_out: RollOut) -> dict[str, float]:
     exact = roll_out.scene.exact
     if exact is None:
         return {}
-    apart = np.linalg.norm(roll_out.positions - exact[: len(roll_out.positions)], axis=2)
-    return {"exact/distance": float(apart.max())}
+    gaps = np.linalg.norm(roll_out.positions - exact[: len(roll_out.positions)], axis=2)
+    return {"exact/distance": float(gaps.max())}
 
 
 def measure_deformation(roll_out: RollOut) -> dict[str, float]:

@@ -46,20 +46,20 @@ def measure_extrapolation(roll_out: RollOut) -> dict[str, float]:
     if scene.cloth.material != garment.material and len(x) == scene.frames:
         values["motion/total"] = float(energies(roll_out)["total"][roll_out.judged].mean())
     if scene.glitch is not None and ordinary is not None:
-        apart = geometry.distance_rms(whole, ordinary[: len(whole)])
+        gaps = geometry.distance_rms(whole, ordinary[: len(whole)])
         values |= {
-            f"motion/recovery_{after}": MM * float(apart[scene.glitch + after])
+            f"motion/recovery_{after}": MM * float(gaps[scene.glitch + after])
             for after in AFTER
-            if scene.glitch + after < len(apart)
+            if scene.glitch + after < len(gaps)
         }
     return values
 
 
 def judge(roll_out: RollOut, values: dict[str, float]) -> tuple[str, str] | None:
     """Return that a network diverged whose garment left the body, or None."""
-    far = values.get("motion/offset", 0.0) / MM
-    if roll_out.entry.trained and far > LOST:
-        return "diverged", f"a vertex came {far:.2g} m away from the skinned shirt"
+    offset = values.get("motion/offset", 0.0) / MM
+    if roll_out.entry.trained and offset > LOST:
+        return "diverged", f"a vertex came {offset:.2g} m away from the skinned shirt"
     return None
 
 
@@ -80,8 +80,8 @@ def measure_long_roll_out(roll_out: RollOut) -> dict[str, float]:
     if scene.repeated is None or scene.dressed is None or len(x) < scene.frames:
         return {}
     early, late = scene.repeated
-    kept = np.arange(len(x)) if scene.kept is None else scene.kept
-    origins = scene.dressed.motion.translations[kept]
+    frames = np.arange(len(x)) if scene.kept is None else scene.kept
+    origins = scene.dressed.motion.translations[frames]
     cloth = np.sum([series for term, series in energies(roll_out).items() if term in OF_CLOTH], axis=0)
     moved = (x[late] - x[early]) - (origins[late] - origins[early])[:, None]
     return {

@@ -47,12 +47,12 @@ def measure_body(roll_out: RollOut) -> dict[str, float]:
         return {}
     faces, rest = scene.obstacle.faces, scene.dressed.body.shaped(scene.dressed.betas)
     at_rest = inside_itself(rest, faces)  # eyes in their sockets
-    judged = np.unique(np.linspace(scene.warm_up, frames - 1, SAMPLED_FRAMES).round().astype(int))
-    share = [(inside_itself(scene.obstacle.at(frame), faces) & ~at_rest).mean() for frame in judged]
+    samples = np.unique(np.linspace(scene.warm_up, frames - 1, SAMPLED_FRAMES).round().astype(int))
+    share = [(inside_itself(scene.obstacle.at(frame), faces) & ~at_rest).mean() for frame in samples]
     worst = int(np.argmax(share))
     return {
         "body/self_intersection": 100.0 * float(share[worst]),
-        "body/self_intersection_frame": float(judged[worst]),
+        "body/self_intersection_frame": float(samples[worst]),
     }
 
 

@@ -80,14 +80,14 @@ def _crossings(x, edges_of, face, ends, crossings):
     a, b, c = face[0], face[1], face[2]
     for i in range(3):
         p, q = edges_of[i], edges_of[(i + 1) % 3]
-        before, behind = _volume(x, a, b, c, p), _volume(x, a, b, c, q)
-        if before * behind >= 0.0:
+        side_p, side_q = _volume(x, a, b, c, p), _volume(x, a, b, c, q)
+        if side_p * side_q >= 0.0:
             continue
         first, second, third = _volume(x, p, q, a, b), _volume(x, p, q, b, c), _volume(x, p, q, c, a)
         if (first > 0.0 and second > 0.0 and third > 0.0) or (
             first < 0.0 and second < 0.0 and third < 0.0
         ):
-            share = before / (before - behind)
+            share = side_p / (side_p - side_q)
             for axis in range(3):
                 ends[crossings, axis] = (1.0 - share) * x[p, axis] + share * x[q, axis]
             crossings += 1

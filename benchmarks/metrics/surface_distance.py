@@ -75,9 +75,9 @@ def _barycentric(points: Floats, corners: Floats) -> Floats:
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normals, away = np.cross(first, second), points - corners[:, 0]
     whole = np.maximum((normals**2).sum(axis=1), np.finfo(float).tiny)
-    beside = (np.cross(away, second) * normals).sum(axis=1) / whole
-    beyond = (np.cross(first, away) * normals).sum(axis=1) / whole
-    return np.stack([1.0 - beside - beyond, beside, beyond], axis=1)
+    u = (np.cross(away, second) * normals).sum(axis=1) / whole
+    v = (np.cross(first, away) * normals).sum(axis=1) / whole
+    return np.stack([1.0 - u - v, u, v], axis=1)
 
 
 SURFACE = Measurements(

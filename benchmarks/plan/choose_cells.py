@@ -49,8 +49,8 @@ def choose_cells(read: ReadStudy) -> tuple[tuple[Cell, ...], tuple[Case, ...]]:
         methods = matching(read.methods, study.methods or study.parts[name].methods)
         pairs = ((read.scenes[scene], read.methods[method]) for scene in scenes for method in methods)
         for scene, entry in (pair for pair in pairs if pair[1].meant_for(pair[0])):
-            alone = bool(matching([entry.name], study.one_seed))
-            for seed in study.seeds[: 1 if alone else None] if entry.seeded else (0,):
+            one_seed = bool(matching([entry.name], study.one_seed))
+            for seed in study.seeds[: 1 if one_seed else None] if entry.seeded else (0,):
                 key = (scene.name, entry.name, seed)
                 before = chosen[key].suites if key in chosen else ()
                 chosen[key] = Cell(scene.at(study.sizes), entry, seed, (*before, name))
@@ -65,8 +65,8 @@ def choose_cells(read: ReadStudy) -> tuple[tuple[Cell, ...], tuple[Case, ...]]:
     # The reference first: an error against it can be said as soon as another cell is done.
     places = {name: place for place, name in enumerate(read.scenes)}
     order = {name: place for place, name in enumerate((*read.methods, *study.rollouts))}
-    found = (*chosen.values(), *stored)
-    ordered = sorted(found, key=lambda c: (places[c.scene.name], order.get(c.method, 0), c.seed))
+    unsorted = (*chosen.values(), *stored)
+    ordered = sorted(unsorted, key=lambda c: (places[c.scene.name], order.get(c.method, 0), c.seed))
     cells = _timed_once(ordered)
     _check_user_scenes([cell.scene for cell in cells], read.motions)
     return tuple(cells), cases
@@ -90,9 +90,9 @@ def matching(names: Iterable[str], patterns: Sequence[str]) -> list[str]:
     >>> matching(["snug", "snug-no-noise", "snug+cleanup"], ["snug*", "!*+*"])
     ['snug', 'snug-no-noise']
     """
-    unwanted = [pattern[1:] for pattern in patterns if pattern.startswith("!")]
-    wanted = [pattern for pattern in patterns if not pattern.startswith("!")] or ["*"] * bool(unwanted)
-    return [name for name in names if _means(name, wanted) and not _means(name, unwanted)]
+    excluded = [pattern[1:] for pattern in patterns if pattern.startswith("!")]
+    included = [pattern for pattern in patterns if not pattern.startswith("!")] or ["*"] * bool(excluded)
+    return [name for name in names if _means(name, included) and not _means(name, excluded)]
 
 
 def _means(name: str, patterns: Sequence[str]) -> bool:
@@ -104,22 +104,20 @@ def scenes_of_parts(read: ReadStudy) -> dict[str, list[str]]:
 
     A scene that field `scenes` names and no part lists is met in the first part with a scene of its kind.
     """
-    declared, wanted, parts = read.scenes, read.study.scenes, read.study.parts
-    usual = {
-        name: matching(declared, expanded(part.scenes, read.motions)) for name, part in parts.items()
-    }
-    if not wanted:
+    scenes, patterns, parts = read.scenes, read.study.scenes, read.study.parts
+    usual = {name: matching(scenes, expanded(part.scenes, read.motions)) for name, part in parts.items()}
+    if not patterns:
         return usual
-    further = {n: matching(declared, expanded(p.optional_scenes, read.motions)) for n, p in parts.items()}
-    listed = {name for of in (usual, further) for names in of.values() for name in names}
-    chosen = {n: matching(dict.fromkeys((*usual[n], *further[n])), wanted) for n in parts}
-    fresh = [p for p in wanted if p in declared or p.startswith("!") or not matching(listed, [p])]
-    for name in matching(declared, fresh) if set(fresh) - listed else ():
-        scene = declared[name]
+    extras = {n: matching(scenes, expanded(p.optional_scenes, read.motions)) for n, p in parts.items()}
+    listed = {name for group in (usual, extras) for names in group.values() for name in names}
+    chosen = {n: matching(dict.fromkeys((*usual[n], *extras[n])), patterns) for n in parts}
+    strays = [p for p in patterns if p in scenes or p.startswith("!") or not matching(listed, [p])]
+    for name in matching(scenes, strays) if set(strays) - listed else ():
+        scene = scenes[name]
         of_split = scene.dressed and scene.motion in read.motions.measured_of(scene.garment)
-        homes = [part for part in parts if scene.part in {declared[n].part for n in usual[part]}]
-        homes += list(parts) if name in wanted else []
-        if name not in listed and homes and (name in wanted or of_split):
+        homes = [part for part in parts if scene.part in {scenes[n].part for n in usual[part]}]
+        homes += list(parts) if name in patterns else []
+        if name not in listed and homes and (name in patterns or of_split):
             chosen[homes[0]].append(name)
     return chosen
 
@@ -128,7 +126,7 @@ def expanded(patterns: Sequence[str], motions: Motions) -> list[str]:
     """Return the patterns of a part with garment and motions of a run in their places."""
     expansions = []
     for pattern in patterns:
-        pattern = pattern.replace("{garment}", motions.worn[0].garment)
+        pattern = pattern.replace("{garment}", motions.garments[0].garment)
         if not (place := PLACES.search(pattern)):
             expansions.append(pattern)
             continue
@@ -148,14 +146,14 @@ def _timed_once(cells: Sequence[Cell]) -> list[Cell]:
     """
     untimed = tuple(m.name for m in measured_in(None) if m.name != "cost")
     begun: dict[str, Scene] = {}
-    kept = []
+    result = []
     for cell in cells:
         scene = cell.scene
         whole = scene.part == "whole" and scene.metrics is None and not scene.declared_in
         if whole and begun.setdefault(scene.garment, scene) != scene:
             cell = replace(cell, scene=replace(scene, metrics=untimed))
-        kept.append(cell)
-    return kept
+        result.append(cell)
+    return result
 
 
 def _cases(study: Study, cases: Sequence[Case]) -> Iterator[Case]:
@@ -174,13 +172,13 @@ def _check_words(read: ReadStudy) -> None:
     """Raise StudyError for a word of a field that nothing has as its name."""
     study, methods, cases = read.study, list(read.methods), [case.name for case in read.cases]
 
-    def check(field: str, known: Sequence[str], names: Iterable[str]) -> None:
+    def check(field: str, choices: Sequence[str], names: Iterable[str]) -> None:
         for word in names:
-            if not matching(known, [word.removeprefix("!")]):
-                what, hint = field.rpartition(".")[2].removesuffix("s"), ""
-                if what == "scene" and "/" in word:
+            if not matching(choices, [word.removeprefix("!")]):
+                kind, hint = field.rpartition(".")[2].removesuffix("s"), ""
+                if kind == "scene" and "/" in word:
                     hint = " (scenes of a dressed body are validation and test motions: see test_motions)"
-                raise StudyError(f"{field}: unknown {what} '{word}'; {nearest(word, known)}{hint}")
+                raise StudyError(f"{field}: unknown {kind} '{word}'; {nearest(word, choices)}{hint}")
 
     check("scenes", [*read.scenes, *cases], study.scenes)
     check("methods", methods, study.methods)
@@ -196,13 +194,13 @@ def _check_words(read: ReadStudy) -> None:
 
 def _check_user_scenes(scenes: Sequence[Scene], motions: Motions) -> None:
     """Raise StudyError for a start or a motion that a user's scene names and nobody knows."""
-    starts = (*further_scenes(motions.worn[0].garment), *scenes)
+    starts = (*further_scenes(motions.garments[0].garment), *scenes)
     settling = [scene.name for scene in starts if scene.simulated and not scene.start_of]
     for scene in (scene for scene in scenes if scene.declared_in):
         for field, names in (("start_of", settling), ("motion", [*motions.files, *LIBRARY])):
             if (word := getattr(scene, field)) not in ("", *names):
-                what = f"{scene.declared_in}: scene '{scene.name}': {field}='{word}'"
-                raise StudyError(f"{what}: nothing that serves is called so; {nearest(word, names)}")
+                place = f"{scene.declared_in}: scene '{scene.name}': {field}='{word}'"
+                raise StudyError(f"{place}: nothing that serves is called so; {nearest(word, names)}")
 
 
 def roll_out_cells(study: Study, cells: Sequence[Cell], methods: Mapping[str, MethodEntry]) -> list[Cell]:
@@ -223,16 +221,16 @@ def roll_out_cells(study: Study, cells: Sequence[Cell], methods: Mapping[str, Me
         suites.setdefault(cell.scene.name, {}).update(dict.fromkeys(cell.suites))
     stored: list[Cell] = []
     for option in study.rollouts.values():
-        what = f"{option.name}={option.path}"
+        text = f"{option.name}={option.path}"
         if option.name in methods:
-            raise StudyError(f"{what}: a method is called {option.name}: give another name")
+            raise StudyError(f"{text}: a method is called {option.name}: give another name")
         if len(scenes) != 1 and PLACE not in option.path:
             raise StudyError(
-                f"{what}: is of one scene, and {len(scenes)} are asked for: name it with --scenes, or put "
+                f"{text}: is of one scene, and {len(scenes)} are asked for: name it with --scenes, or put "
                 "{scene} into the path"
             )
         entries = {name: entry for name in scenes if (entry := entry_of(option, name))}
         if not entries:
-            raise StudyError(f"{what}: no file for {', '.join(scenes)}")
+            raise StudyError(f"{text}: no file for {', '.join(scenes)}")
         stored += [Cell(scenes[name], entry, 0, tuple(suites[name])) for name, entry in entries.items()]
     return stored

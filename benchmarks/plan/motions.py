@@ -22,7 +22,7 @@ from snug.motion.library import (
 class Motions:
     """Names of the motions of a run by their roles.
 
-    files: those that came from a user's files. worn: the garments of the run; the first is that of a run
+    files: those that came from a user's files. garments: those of the run; the first is that of a run
     where none is named. split: the role whose motions stand in the suites' scenes, "test" or
     "validation".
     few: so many of them, the first, stand there; None: all.
@@ -33,7 +33,7 @@ class Motions:
     test: tuple[str, ...] = ()
     validation: tuple[str, ...] = ()
     files: Collection[str] = ()
-    worn: tuple[GarmentScenes, ...] = GARMENT_SCENES
+    garments: tuple[GarmentScenes, ...] = GARMENT_SCENES
     split: str = "test"
     few: int | None = None
     dynamic: tuple[tuple[str, ...], ...] = (DYNAMIC_VALIDATION, DYNAMIC_TEST)
@@ -57,7 +57,7 @@ class Motions:
 
     def by_role(self, garment: str) -> dict[str, tuple[str, ...]]:
         """Return role -> names of a garment's motions."""
-        return self.roles(dynamic=of_garment(garment, self.worn).dynamic)
+        return self.roles(dynamic=of_garment(garment, self.garments).dynamic)
 
     def measured_of(self, garment: str) -> tuple[str, ...]:
         """Return the names of a garment's motions of the split."""

@@ -1,6 +1,6 @@
 """Options of commands that read a study: short forms of its fields, the text of --list.
 
-Light, so that --help answers at once.
+Light, so --help answers at once.
 """
 
 from __future__ import annotations
@@ -92,11 +92,11 @@ def add_study_options(parser: argparse.ArgumentParser, short: Sequence[str] = OF
         help="another value of a field of the study, as split=validation or sizes.frames=60; repeatable"
     )  # fmt: skip
     for field in short:
-        more: dict[str, Any] = {} if field in SINGLE else {"action": "append", "default": []}
-        more |= {"nargs": "?", "const": True} if field == "trained" else {}
-        more |= {"metavar": SHORT[field], "help": f"field {field}: {texts[field]}"}
+        kwargs: dict[str, Any] = {} if field in SINGLE else {"action": "append", "default": []}
+        kwargs |= {"nargs": "?", "const": True} if field == "trained" else {}
+        kwargs |= {"metavar": SHORT[field], "help": f"field {field}: {texts[field]}"}
         name = "rollout" if field == "rollouts" else field.replace("_", "-")
-        parser.add_argument(f"--{name}", dest=field, **more)
+        parser.add_argument(f"--{name}", dest=field, **kwargs)
 
 
 def study_of(options: argparse.Namespace, name: str = "full") -> Study:
@@ -116,13 +116,13 @@ def _tables(options: argparse.Namespace) -> Iterator[Table]:
         elif field == "motions":
             paths = list(map(split_words, value))
             value = [path for path, _ in paths]
-            if fields := {name: word for _, given in paths for name, word in given.items()}:
+            if fields := {name: word for _, table in paths for name, word in table.items()}:
                 yield option("motion_files", fields)
         elif field == "rollouts":
             value = dict(map(parse_roll_out, value))
         elif field not in SINGLE:
-            words = (word.strip() for given in value for word in given.split(","))
-            value = list(filter(None, words))
+            parts = (part.strip() for text in value for part in text.split(","))
+            value = list(filter(None, parts))
         if field == "seeds":
             value = [int(word) if word.removeprefix("-").isdecimal() else word for word in value]
         yield option(field, value)
@@ -158,7 +158,7 @@ def _sections(study: Study) -> dict[str, dict[str, str]]:
     """Return title -> name -> text of what can be named."""
     read = read_files(study)
     motions, parts = read.motions, study.parts
-    clip = f"{motions.worn[0].garment}/{motions.measured[0]}@clip"
+    clip = f"{motions.garments[0].garment}/{motions.measured[0]}@clip"
     scenes = {
         scene.name: scene.description + (f" ({motions.role_of(scene.motion)})" if scene.dressed else "")
         for scene in read.scenes.values()
@@ -166,8 +166,8 @@ def _sections(study: Study) -> dict[str, dict[str, str]]:
     }
     methods = {}
     for name, entry in read.methods.items():
-        known = ", ".join(part for part in parts if matching([name], parts[part].methods))
-        methods[name] = f"{entry.description} [{known or 'when named'}]"
+        homes = ", ".join(part for part in parts if matching([name], parts[part].methods))
+        methods[name] = f"{entry.description} [{homes or 'when named'}]"
     listed = {part: ", ".join(names) for part, names in scenes_of_parts(read).items() if names}
     return {
         "studies": {name: read_study(name).question for name in study_names()},

@@ -72,7 +72,7 @@ class Network:
 class Plan:
     """Everything to be done.
 
-    metrics: modules of metrics that are not the project's, see benchmarks.plan.user_files. inputs: the
+    metrics: modules of metrics not the project's, see benchmarks.plan.user_files. inputs: the
     user's files, as read. retry: whether tasks that have failed are done again; fresh: all that the
     folder holds is forgotten first. workers: processes side by side where nothing is timed. scheduler:
     address of a cluster that does what is not timed; empty: this machine does. Raises StudyError where
@@ -116,11 +116,11 @@ class Plan:
     @property
     def cut_motions(self) -> dict[str, str]:
         """Motion of a user's file -> which of its frames are measured, where these are not all."""
-        most = self.study.sizes.frames
+        limit = self.study.sizes.frames
         return {
-            name: f"the first {most} of {motion.frames} frames"
+            name: f"the first {limit} of {motion.frames} frames"
             for name, motion in self.inputs.motions.items()
-            if name in self.motions.measured and motion.frames > most
+            if name in self.motions.measured and motion.frames > limit
         }
 
     def open_assets(self) -> Assets:
@@ -130,9 +130,9 @@ class Plan:
         for garment in self.garments:
             names += self.motions.measured_of(garment)
         names += train if self.networks else ()
-        wanted = dict.fromkeys(names)
-        motions = [read[name] for name in wanted if name in read]
-        motions += embedded_motions(name for name in wanted if name not in read)
+        names = list(dict.fromkeys(names))
+        motions = [read[name] for name in names if name in read]
+        motions += embedded_motions(name for name in names if name not in read)
         return open_assets(self.study.sizes, motions, self.garments, inputs=self.inputs, training=train)
 
 
@@ -157,8 +157,8 @@ def protocol_of(cell: Cell, plan: Plan) -> str:
     the project's own networks train on.
     """
     scene, inputs, sizes = cell.scene, plan.inputs, plan.study.sizes
-    given = scene.dressed and (inputs.body or scene.motion in inputs.motions)
-    if given or sizes != find_preset(sizes.name) or not _is_declared(scene, sizes.name):
+    from_user = scene.dressed and (inputs.body or scene.motion in inputs.motions)
+    if from_user or sizes != find_preset(sizes.name) or not _is_declared(scene, sizes.name):
         return OWN
     entries = (c.entry for c in plan.cells if c.scene == scene)
     if any(entry.role == "reference" and entry.module == STORED for entry in entries):
@@ -172,8 +172,8 @@ def protocol_of(cell: Cell, plan: Plan) -> str:
 
 def protocol_of_case(scene: str, metric: str) -> str:
     """Return the protocol of a row that no cell gives: OWN of a case that is not the project's."""
-    known = any(scene == case.name or (scene, metric) == (case.scene, case.metric) for case in CASES)
-    return NUMBER if known else OWN
+    listed = any(scene == case.name or (scene, metric) == (case.scene, case.metric) for case in CASES)
+    return NUMBER if listed else OWN
 
 
 _declared_with = cache(all_scenes)  # motions and swinging motions
@@ -182,8 +182,8 @@ _declared_with = cache(all_scenes)  # motions and swinging motions
 def _is_declared(scene: Scene, preset: str) -> bool:
     """Return whether the project declares the scene so; a run may leave out what is measured in it."""
     motions = (scene.motion,) * bool(scene.motion)
-    known = _declared_with(motions, motions).get(scene.name)
-    return known is not None and replace(known.at(find_preset(preset)), metrics=scene.metrics) == scene
+    ours = _declared_with(motions, motions).get(scene.name)
+    return ours is not None and replace(ours.at(find_preset(preset)), metrics=scene.metrics) == scene
 
 
 # the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
@@ -197,7 +197,7 @@ def make_plan(
     workers: int | None = None,
     scheduler: str = "",
     scenes: Sequence[Scene] = (),
-    **further: Any,
+    **fields: Any,
 ) -> Plan:
     """Return the plan of a study: cells, cases, motions and a user's inputs as read.
 
@@ -230,7 +230,7 @@ def make_plan(
         folder=folder,
         workers=workers,
         scheduler=scheduler,
-        **further,
+        **fields,
     )
 
 
@@ -251,22 +251,23 @@ def read_files(study: Study, scenes: Sequence[Scene] = ()) -> ReadStudy:
     inputs = read_inputs(study.body, garment, study.motions, study.motion_files)
     motions = split_motions(study, inputs.motions)
     of_file = [GarmentScenes(garment.name, f"a garment of {garment.path.name}")] if garment else []
-    worn = (*of_file, *motions.worn[len(of_file) :])  # in place of the T-shirt
-    motions = replace(motions, worn=tuple(replace(w, self_contact=self_contact) for w in worn))
+    garments = (*of_file, *motions.garments[len(of_file) :])  # in place of the T-shirt
+    garments = tuple(replace(w, self_contact=self_contact) for w in garments)
+    motions = replace(motions, garments=garments)
     roles, dynamic = motions.roles(), motions.roles(dynamic=True)
     measured = all_scenes(
         dict.fromkeys((*motions.measured, *roles["test"], *roles["validation"])),
         (*dynamic["test"], *dynamic["validation"]),
-        motions.worn,
+        motions.garments,
     )
-    known = by_name("scene", (*measured.values(), *scenes, *user_scenes))
+    scene_of = by_name("scene", (*measured.values(), *scenes, *user_scenes))
     methods = by_name("method", (*METHODS, *user_methods))
     cases = by_name("known answer", (*CASES, *user_cases))
-    return ReadStudy(study, inputs, motions, known, methods, tuple(cases.values()))
+    return ReadStudy(study, inputs, motions, scene_of, methods, tuple(cases.values()))
 
 
 def choose_metrics(study: Study) -> tuple[str, ...]:
-    """Return the modules of metrics that are not the project's. Raises ValueError."""
+    """Return the modules of metrics not the project's. Raises ValueError."""
     names, metrics = user_files.resolve(user_files.METRICS, study.metrics)
     for name in set(names) - {metric.name for metric in metrics}:
         raise StudyError(f"metrics: {name}: is no file; those of the project are measured without it")
@@ -290,10 +291,10 @@ def check_machines(study: Study, folder: Path, scheduler: str) -> None:
     # where networks of another training are removed
     if trained and trained.resolve() == folder.resolve():
         raise StudyError(f"trained: {trained}: the folder of this run itself: give another by --out")
-    for name, given in (("rollouts", study.rollouts), ("trained", trained), ("device", study.device)):
-        if scheduler and given and given != "cpu":
-            what = f"{name}: a cluster has the cpu, and no file of this machine"
-            raise StudyError(f"{what}; leave out --scheduler")
+    for name, value in (("rollouts", study.rollouts), ("trained", trained), ("device", study.device)):
+        if scheduler and value and value != "cpu":
+            fault = f"{name}: a cluster has the cpu, and no file of this machine"
+            raise StudyError(f"{fault}; leave out --scheduler")
 
 
 def choose_folder(folder: Path | None) -> Path:

@@ -1,4 +1,4 @@
-"""Study: everything that is asked of a run, read from a TOML file and from options.
+"""Study: all that is asked of a run, read from a TOML file and from options.
 
 Every field is an attribute of a dataclass, whose type says what it takes.
 """
@@ -54,7 +54,7 @@ class Part:
 
 @dataclass(frozen=True, kw_only=True)
 class Show:
-    """Content that is published of a run besides its rows, tables and PDF.
+    """Content published of a run besides its rows, tables and PDF.
 
     Attributes:
         networks: names of networks whose seed 0 is kept, in half precision.
@@ -88,7 +88,7 @@ class Study:
         methods: these in every part, in place of its own: names, patterns, files (mine.py) of methods.
         metrics: files of your own metrics, measured besides all others.
         seeds: seeds of training.
-        one_seed: patterns of methods that are trained with the first of the seeds alone.
+        one_seed: patterns of methods trained with the first seed alone.
         motions: motion files (.npz, .bvh, .amc with .asf), folders, or the word library (default).
         motion_files: what motion files do not state: up, fps; split: snug or hood, that paper's clips alone.
         test_motions: names of the motions that test; by default those of the library.
@@ -130,21 +130,21 @@ class Study:
 
     def __post_init__(self) -> None:
         if not self.seeds or min(self.seeds) < 0 or max(self.seeds) >= 1 << 63:
-            given = ",".join(map(str, self.seeds))[:40]
-            wanted = "at least one whole number, none below 0 or beyond 63 bits"
-            raise StudyError(f"seeds: '{given}': give {wanted}")
+            seeds = ",".join(map(str, self.seeds))[:40]
+            remedy = "at least one whole number, none below 0 or beyond 63 bits"
+            raise StudyError(f"seeds: '{seeds}': give {remedy}")
         if self.sizes.frames < FEWEST_FRAMES:
             raise StudyError(f"sizes.frames: {self.sizes.frames}: give {FEWEST_FRAMES} or more")
         for name in self.parts:
             if name not in PARTS and not self.parts[name].question:
-                known = f"choose from {', '.join(PARTS)}, or give it a question"
-                raise StudyError(f"parts.{name}: no part is called so; {known}")
+                remedy = f"choose from {', '.join(PARTS)}, or give it a question"
+                raise StudyError(f"parts.{name}: no part is called so; {remedy}")
 
 
 def nearest(word: str, names: Sequence[str], otherwise: str = "see --list") -> str:
     """Return the names that a wrong word may have meant, as the end of a message."""
-    near = difflib.get_close_matches(word, names, n=3, cutoff=0.5)
-    return f"did you mean {' or '.join(near)}?" if near else otherwise
+    matches = difflib.get_close_matches(word, names, n=3, cutoff=0.5)
+    return f"did you mean {' or '.join(matches)}?" if matches else otherwise
 
 
 FILE = "study.toml"  # of a study that is a folder
@@ -176,8 +176,8 @@ def read_study(word: str = "full", options: Sequence[Table] = ()) -> Study:
     """
     name, _, chosen = word.partition(":")
     table = _fields_of(find_study(name))
-    for given in options:
-        table = _merged(table, _with_tables(given))
+    for entry in options:
+        table = _merged(table, _with_tables(entry))
     if chosen:
         parts, names = table.get("parts", {}), [part for part in chosen.split(",") if part]
         for part in names:
@@ -211,14 +211,14 @@ def find_study(name: str) -> Path:
     )
 
 
-def located(message: str, study: str, words: Sequence[str]) -> str:
+def located(message: str, study: str, options: Sequence[str]) -> str:
     """Return the message of a faulty field behind the file and line of the study that give it.
 
     A field that the words of the command line give has none.
     """
-    given = {word.partition("=")[0].lstrip("-").replace("-", "_") for word in words}
+    names = {word.partition("=")[0].lstrip("-").replace("-", "_") for word in options}
     field = message.partition(":")[0]
-    if field in given or not re.fullmatch(r"[\w.]+", field):
+    if field in names or not re.fullmatch(r"[\w.]+", field):
         return message
     path = find_study(study.partition(":")[0])
     place = _line_of(path, field)
@@ -238,8 +238,8 @@ def _line_of(path: Path, field: str) -> str:
         elif name and header:
             name = f"{header}.{name}"
         lines.setdefault(name, number)
-    known = (lines[name] for name in (field, field.rpartition(".")[0]) if name and name in lines)
-    return next((f"line {number}: " for number in known), "")
+    numbers = (lines[name] for name in (field, field.rpartition(".")[0]) if name and name in lines)
+    return next((f"line {number}: " for number in numbers), "")
 
 
 def study_names() -> list[str]:
@@ -294,9 +294,9 @@ def _read_table(path: Path) -> dict[str, Any]:
         raise StudyError(f"{path}: not readable as TOML ({' '.join(str(error).split())})") from None
 
 
-def _fields_of(path: Path, seen: tuple[Path, ...] = ()) -> Table:
+def _fields_of(path: Path, chain: tuple[Path, ...] = ()) -> Table:
     """Return the fields of a file and, below them, of the study that it is like, and so on."""
-    if path in seen:
+    if path in chain:
         raise StudyError(f"{path}: is like itself")
     table = _with_tables(_read_table(path))
     if path.parent != PACKAGED:
@@ -304,9 +304,9 @@ def _fields_of(path: Path, seen: tuple[Path, ...] = ()) -> Table:
     if "like" not in table:
         return table
     like = str(table.pop("like"))
-    beside = path.parent / like
-    base = beside if beside.is_file() else find_study(str(beside) if beside.is_dir() else like)
-    return _merged(_fields_of(base, (*seen, path)), table)
+    sibling = path.parent / like
+    base = sibling if sibling.is_file() else find_study(str(sibling) if sibling.is_dir() else like)
+    return _merged(_fields_of(base, (*chain, path)), table)
 
 
 def _beside(folder: Path, name: str, value: Any) -> Any:
@@ -321,10 +321,8 @@ def _beside(folder: Path, name: str, value: Any) -> Any:
 
 def _with_tables(table: Table) -> dict[str, Any]:
     """Return the fields with a table for each word that may stand in place of one."""
-    meant = {
-        name: WORDS_FOR_TABLES[name] for name in WORDS_FOR_TABLES if isinstance(table.get(name), str)
-    }
-    table = {**table, **{name: {field: table[name]} for name, field in meant.items()}}
+    keys = {name: WORDS_FOR_TABLES[name] for name in WORDS_FOR_TABLES if isinstance(table.get(name), str)}
+    table = {**table, **{name: {field: table[name]} for name, field in keys.items()}}
     if isinstance(files := table.get("rollouts"), Mapping):
         table["rollouts"] = {n: {"path": v} if isinstance(v, str) else v for n, v in files.items()}
     return table
@@ -352,8 +350,8 @@ def _dataclass_of(kind: Any, table: Any, field: tuple[str, ...] = ()) -> Any:
     declared = [f.name for f in fields(kind) if f.name not in HIDDEN.get(kind, ())]
     for name in table:
         if name not in declared:
-            near = nearest(name, declared, otherwise=f"there are {', '.join(declared)}")
-            _refuse((*field, name), f"no field is called '{name}'; {near}")
+            hint = nearest(name, declared, otherwise=f"there are {', '.join(declared)}")
+            _refuse((*field, name), f"no field is called '{name}'; {hint}")
     for f in fields(kind):
         if f.default is MISSING and f.default_factory is MISSING and f.name not in table and not base:
             _refuse(field, f"{f.name} is absent: give it")

@@ -66,13 +66,13 @@ def declarations_of(study: Study) -> tuple[Study, list[Scene], list[MethodEntry]
     """
     declared: dict[Kind, list[Any]] = {SCENES: [], METHODS: [], CASES: []}
 
-    def named(of: Study | Part, suite: str = "") -> Any:
+    def named(part: Study | Part, suite: str = "") -> Any:
         changes: dict[str, Any] = {}
-        for field, kind in ((field, kind) for field, kind in OF_FIELD.items() if hasattr(of, field)):
-            changes[field], entries = resolve(kind, getattr(of, field))
+        for field, kind in ((field, kind) for field, kind in OF_FIELD.items() if hasattr(part, field)):
+            changes[field], entries = resolve(kind, getattr(part, field))
             entries = [replace(case, suite=suite) for case in entries] if kind is CASES else entries
             declared[kind] += [entry for entry in entries if entry not in declared[kind]]
-        return replace(of, **changes)
+        return replace(part, **changes)
 
     parts = {name: named(part, name) for name, part in study.parts.items()}
     study = replace(named(study), parts=parts)
@@ -84,11 +84,11 @@ def check_networks(entries: Sequence[MethodEntry]) -> None:
     """Raise DeclarationError where two trainings have one name: one network would be the other's."""
     trainings = dict(TRAININGS)
     for entry in (entry for entry in entries if entry.trained is not None):
-        what, name = f"{entry.declared_in}: method '{entry.name}'", str(entry.trained)
-        known = entry.training or name in trainings
-        _demand(known, f"{what}: no training is called '{name}': say training=Training(...)")
+        place, name = f"{entry.declared_in}: method '{entry.name}'", str(entry.trained)
+        exists = entry.training or name in trainings
+        _demand(exists, f"{place}: no training is called '{name}': say training=Training(...)")
         same = not entry.training or trainings.setdefault(name, entry.training) == entry.training
-        _demand(same, f"{what}: another training is called '{name}': give trained=another")
+        _demand(same, f"{place}: another training is called '{name}': give trained=another")
 
 
 def file_of(word: str) -> str:
@@ -104,15 +104,15 @@ def entries_of(kind: Kind, home: str) -> list[Any]:
         cases = cases_of(module.__name__)
         _demand(cases, f"{home}: declares no known answer, a function with @known_answer")
         return [replace(case, module=home) for case in cases]
-    declared: Any = getattr(module, kind.tuple_name, None)
-    meant = declared and isinstance(declared, tuple | list)
-    if not (meant and all(isinstance(entry, kind.entry) for entry in declared)):
+    items: Any = getattr(module, kind.tuple_name, None)
+    is_tuple = items and isinstance(items, tuple | list)
+    if not (is_tuple and all(isinstance(entry, kind.entry) for entry in items)):
         raise DeclarationError(f"{home}: declares no {kind.tuple_name}, a tuple of {kind.entry.__name__}")
-    by_name(kind.word[:-1], declared)
+    by_name(kind.word[:-1], items)
     if kind is METRICS:
-        entries = [replace(entry, declared_in=home) for entry in declared]
+        entries = [replace(entry, declared_in=home) for entry in items]
     else:
-        entries = [_placed(kind, entry, home) for entry in declared]
+        entries = [_placed(kind, entry, home) for entry in items]
     needs_function = home in {getattr(entry, "module", home) for entry in entries}
     _demand(
         not needs_function or hasattr(module, kind.function), f"{home}: has no function {kind.function}"
@@ -122,14 +122,15 @@ def entries_of(kind: Kind, home: str) -> list[Any]:
 
 def _placed(kind: Kind, entry: Any, home: str) -> Any:
     """Return the entry with the file that declares it, and all paths made absolute."""
-    what, folder = f"{home}: {kind.word[:-1]} '{entry.name}'", Path(find_module(home)).parent
+    place, folder = f"{home}: {kind.word[:-1]} '{entry.name}'", Path(find_module(home)).parent
     _demand(NAME.fullmatch(entry.name),
-            f"{what}: name it by at most 150 letters, digits and _ + - . / @ :, not 'body'")  # fmt: skip
+            f"{place}: name it by at most 150 letters, digits and _ + - . / @ :, not 'body'")  # fmt: skip
     for field in ("files", "sizes", "metrics"):
         names = getattr(entry, field, None)
-        _demand(not isinstance(names, str), f"{what}: {field}={names!r}: give a tuple of strings")
-    measured, known = getattr(entry, "metrics", None) or (), [m.name for m in MEASUREMENTS]
-    _demand({*measured} <= {*known}, f"{what}: metrics={measured!r}: choose from {', '.join(known)}")
+        _demand(not isinstance(names, str), f"{place}: {field}={names!r}: give a tuple of strings")
+    measured = getattr(entry, "metrics", None) or ()
+    choices = [m.name for m in MEASUREMENTS]
+    _demand({*measured} <= {*choices}, f"{place}: metrics={measured!r}: choose from {', '.join(choices)}")
     files = tuple(map(file_of, (str(folder / name) for name in entry.files)))
     source = entry.module or home
     source = str((folder / source).resolve()) if source.endswith(".py") else source
@@ -137,7 +138,7 @@ def _placed(kind: Kind, entry: Any, home: str) -> Any:
         digest(dict(entry.options))
         find_module(source)
     except (TypeError, ValueError) as error:
-        raise DeclarationError(f"{what}: {error}") from None
+        raise DeclarationError(f"{place}: {error}") from None
     return replace(entry, module=source, declared_in=home, files=files)
 
 
@@ -153,9 +154,9 @@ def import_file(home: str) -> ModuleType:
     except DeclarationError:
         raise
     except BaseException as error:  # whatever a user's file raises, also what usually ends a program
-        what = error.msg if isinstance(error, SyntaxError) else f"{type(error).__name__}: {error}"
-        where = raised_at(error, home) or home
-        raise DeclarationError(f"{where}: {' '.join(what.split())}") from None
+        fault = error.msg if isinstance(error, SyntaxError) else f"{type(error).__name__}: {error}"
+        place = raised_at(error, home) or home
+        raise DeclarationError(f"{place}: {' '.join(fault.split())}") from None
     for name, path in imported_beside(home).items():  # two folders may have a utils.py each
         demand_that_it_is(name, path)
     return module

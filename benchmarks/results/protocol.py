@@ -36,7 +36,7 @@ LEAST_MOTIONS = 4  # below which two methods are not told apart
 DRAWS, SEED = 10_000, 20220619  # of the bootstrap; the same draws for every comparison
 
 
-def one_protocol(protocols: Iterable[str], where: object) -> str:
+def one_protocol(protocols: Iterable[str], place: object) -> str:
     """Return the protocol of rows that may stand in one table; empty where all are a user's own.
 
     Raises ResultsError, which says where they are, for rows of two protocols.
@@ -47,7 +47,7 @@ def one_protocol(protocols: Iterable[str], where: object) -> str:
     numbers = sorted(set(protocols) - {OWN, ""})
     if len(numbers) > 1:
         raise ResultsError(
-            f"{where}: rows of protocols {' and '.join(numbers)} do not stand in one table; run the "
+            f"{place}: rows of protocols {' and '.join(numbers)} do not stand in one table; run the "
             "older ones again, in a new folder or with --fresh"
         )
     return numbers[0] if numbers else ""
@@ -74,9 +74,9 @@ def noise(moved: Mapping[str, float]) -> float | None:
     >>> noise({"simulation-perturbed-1e-4": 0.2}), noise({"simulation-dt/2": 0.3})
     (0.14142135623730953, None)
     """
-    known = {REFERENCE: 0.0, **moved}
-    apart = [known[one] - known[two] for one, two in STARTS.values() if {one, two} <= known.keys()]
-    return math.sqrt(sum(x * x for x in apart) / (2 * len(apart))) if apart else None
+    shifts = {REFERENCE: 0.0, **moved}
+    gaps = [shifts[one] - shifts[two] for one, two in STARTS.values() if {one, two} <= shifts.keys()]
+    return math.sqrt(sum(x * x for x in gaps) / (2 * len(gaps))) if gaps else None
 
 
 def trend(moved: Mapping[str, float]) -> dict[str, float]:

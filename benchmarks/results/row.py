@@ -68,7 +68,7 @@ class Row:
             `baseline`.
         base: method that this one varies or starts from.
         seeded: whether another seed gives another value.
-        pairing_group: name shared by variants of one method, which are compared seed by seed.
+        pairing_group: name shared by variants of one method, compared seed by seed.
 
     Raises:
         ResultsError: an unknown status, a non-finite value called ok, or a skip without a reason.
@@ -151,7 +151,7 @@ def cell_text(text: str) -> str:
 
 
 def row_to_cells(row: Row) -> dict[str, str]:
-    """Return the text of each cell; numbers keep all their digits, so that reading gives the same row."""
+    """Return the text of each cell; numbers keep all their digits, so reading gives the same row."""
     cells = {}
     for name in COLUMNS:
         value = getattr(row, name)

@@ -80,7 +80,7 @@ class RunFolder:
         return self.trajectory_path(scene, "settled").with_suffix(".npy")
 
     def remove_parts(self) -> None:
-        """Remove what a run that was killed was just writing: the folder is one run's at a time."""
+        """Remove what a killed run was just writing: the folder is one run's at a time."""
         for path in [*self.path.rglob(".*.part*"), *self.path.rglob("*.vtkhdf.part")]:
             path.unlink(missing_ok=True)
 
@@ -176,8 +176,8 @@ def _curves(path: Path) -> dict[str, np.ndarray]:
     if not path.is_file():
         return {}
     arrays = read_arrays(path)
-    kept = [name for name in arrays if name == SECONDS or name.startswith(ENERGY)]
-    return {name.removeprefix(ENERGY): arrays[name] for name in kept}
+    names = [name for name in arrays if name == SECONDS or name.startswith(ENERGY)]
+    return {name.removeprefix(ENERGY): arrays[name] for name in names}
 
 
 def read_frame_energies(path: Path) -> pd.DataFrame:
@@ -197,5 +197,5 @@ def read_frame_energies(path: Path) -> pd.DataFrame:
             raise ValueError(f"the columns should be {','.join(CELL)} and energies")
         return table.replace("", "nan").astype({"seed": int, **dict.fromkeys(columns[3:], float)})
     except (OSError, ValueError) as error:
-        why = " ".join(str(error).split())
-        raise ResultsError(f"{path}: not readable as CSV in UTF-8 ({why})") from None
+        reason = " ".join(str(error).split())
+        raise ResultsError(f"{path}: not readable as CSV in UTF-8 ({reason})") from None

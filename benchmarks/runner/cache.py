@@ -1,4 +1,4 @@
-"""Finished results of a run's folder: which are reused, and which are stale.
+"""Finished results of a run's folder: which are reused, which stale.
 
 An entry names the inputs, code, packages and files that its outcome came of; where one of them is another
 now, the task is done again. It is written whole after its files, and holds their digests: a file that is
@@ -45,17 +45,17 @@ class Cache:
         if (entry.get("format"), entry.get("task")) != (FORMAT, task.title):
             return "missing: its entry is damaged or of another version", None
         if lost := self.folder.changed(entry["files"]):
-            return "missing: " + ", ".join(f"{name} is {how}" for name, how in lost.items()), None
+            return "missing: " + ", ".join(f"{name} is {state}" for name, state in lost.items()), None
         now, before = dependencies(task, others), entry["parts"]
-        if changed := [name for name in now | before if now.get(name) != before.get(name)]:
-            return "stale: " + ", ".join(changed[:3]) + (", ..." if len(changed) > 3 else ""), None
+        if changes := [name for name in now | before if now.get(name) != before.get(name)]:
+            return "stale: " + ", ".join(changes[:3]) + (", ..." if len(changes) > 3 else ""), None
         files = entry["files"]
         outcome = Outcome(
             **entry["outcome"], files=tuple(files), digests=files, origin=entry["origin"],
             content=_content(entry),
         )  # fmt: skip
-        why = outcome.ending if outcome.failed else ""
-        return why, None if why and self.retry else outcome
+        reason = outcome.ending if outcome.failed else ""
+        return reason, None if reason and self.retry else outcome
 
     def keep(self, task: Task, outcome: Outcome, others: Mapping[TaskId, Outcome]) -> Outcome:
         """Write the entry, after the files; return the outcome as it is kept."""

@@ -30,13 +30,13 @@ UNBELIEVABLE = "its time cannot be believed: "
 
 
 def prepared_method(cell: Cell, context: Context) -> Method:
-    """Return a method that is prepared and has not run."""
+    """Return a prepared method that has not run."""
     method = cell.entry.make(models=context.folder.models_of(cell.scene.garment), seed=cell.seed)
     method.prepare(build_scene(cell.scene, context))
     return method
 
 
-def timed(method: Method, least: float) -> tuple[Trajectory, Reading, list[np.ndarray]]:
+def timed(method: Method, min_time: float) -> tuple[Trajectory, Reading, list[np.ndarray]]:
     """Return the trajectory, the time of each run, and the times (T,) [s] it states for its frames."""
     frames = []
 
@@ -45,7 +45,7 @@ def timed(method: Method, least: float) -> tuple[Trajectory, Reading, list[np.nd
         frames.append(trajectory.frame_seconds)
         return trajectory
 
-    trajectory, reading = clocked(run, of=lambda trajectory: trajectory.positions, least=least)
+    trajectory, reading = clocked(run, read=lambda trajectory: trajectory.positions, min_time=min_time)
     # A first run that compiled is not among them.
     return trajectory, reading, frames[-len(reading.runs) :]
 
@@ -63,10 +63,10 @@ def times(cell: Cell, reading: Reading, frames: list[np.ndarray]) -> dict[str, f
     return result
 
 
-def run_cell(cell: Cell, least: float, context: Context, needed: Needed) -> Outcome:
-    """Return the outcome of a cell: its trajectory, timed for `least` seconds, and the time of its inputs."""
+def run_cell(cell: Cell, min_time: float, context: Context, needed: Needed) -> Outcome:
+    """Return the outcome of a cell: its trajectory, timed for `min_time` [s], and the time of its inputs."""
     try:
-        return compute_cell(cell, least, context)
+        return compute_cell(cell, min_time, context)
     except Exception as error:
         # Nobody is to look at the frames of a cell that failed.
         for name in files_of(cell, context.folder):
@@ -80,7 +80,7 @@ def files_of(cell: Cell, folder: RunFolder) -> tuple[str, ...]:
     return tuple(folder.relative(path(*cell.key)) for path in paths)
 
 
-def compute_cell(cell: Cell, least: float, context: Context) -> Outcome:
+def compute_cell(cell: Cell, min_time: float, context: Context) -> Outcome:
     """Prepare off the clock, run on it, write the trajectory; memory is that until the run has ended."""
     folder = context.folder
     scene, method = build_scene(cell.scene, context), prepared_method(cell, context)
@@ -98,10 +98,11 @@ def compute_cell(cell: Cell, least: float, context: Context) -> Outcome:
     if "declared_ms" in trajectory.provenance:
         result["declared_ms"] = trajectory.provenance["declared_ms"]
     if cell.timed and not reading.complaint:
-        if reading.seconds < least:
-            _, again, further = timed(method, least - reading.seconds)
-            reading, frames = Reading(reading.runs + again.runs, again.complaint), frames + further
-        inputs = clocked_inputs(method, scene, least=INPUTS * least)
+        if reading.seconds < min_time:
+            _, rerun, tail = timed(method, min_time - reading.seconds)
+            reading = Reading(reading.runs + rerun.runs, rerun.complaint)
+            frames += tail
+        inputs = clocked_inputs(method, scene, min_time=INPUTS * min_time)
         result |= times(cell, reading, frames) | {"inputs": inputs.seconds}
         reading = replace(reading, complaint=reading.complaint or inputs.complaint)
     entry = cell.entry
@@ -115,8 +116,8 @@ def compute_cell(cell: Cell, least: float, context: Context) -> Outcome:
     replace(trajectory, provenance=trajectory.provenance | provenance).save(paths[0])
     quasi_static = method.quasi_static() if cell.scene.dynamic or not cell.scene.dressed else None
     if quasi_static is not None:
-        if wrong := misshapen(quasi_static.positions, scene):
-            raise ValueError(f"quasi_static() {wrong}")
+        if fault := misshapen(quasi_static.positions, scene):
+            raise ValueError(f"quasi_static() {fault}")
         same = (quasi_static.positions == trajectory.positions).all()  # one file serves for both
         paths.append(paths[0] if same else folder.quasi_static_path(*cell.key))
         if not same:
@@ -125,10 +126,10 @@ def compute_cell(cell: Cell, least: float, context: Context) -> Outcome:
     return Outcome(status, reason, result=result, files=tuple(map(folder.relative, paths)))
 
 
-def time_batch(cell: Cell, least: float, context: Context, needed: Needed) -> Outcome:
+def time_batch(cell: Cell, min_time: float, context: Context, needed: Needed) -> Outcome:
     """Return the time of many bodies at once, by the method that this process has run."""
     method = context.memo.get("method") or prepared_method(cell, context)
-    positions, reading = clocked(method.batch(BATCH), of=lambda positions: positions, least=least)
+    positions, reading = clocked(method.batch(BATCH), read=lambda positions: positions, min_time=min_time)
     seconds = reading.seconds / (positions.shape[0] * positions.shape[1])
     result = {"seconds": seconds, "complaint": reading.complaint}
     if reading.complaint:
@@ -136,11 +137,11 @@ def time_batch(cell: Cell, least: float, context: Context, needed: Needed) -> Ou
     return Outcome(result=result)
 
 
-def repeat_cell(longest: float, cell: Cell, least: float, context: Context, needed: Needed) -> Outcome:
+def repeat_cell(longest: float, cell: Cell, min_time: float, context: Context, needed: Needed) -> Outcome:
     """Return the time of one more run of a cell, whose first did not take longer than `longest` [s]."""
     if needed[cell.id()].result["seconds"] > longest:
         return Outcome("skipped", "the first run took too long")
-    _, reading, frames = timed(prepared_method(cell, context), least)
+    _, reading, frames = timed(prepared_method(cell, context), min_time)
     if reading.complaint:
         return Outcome("failed", reading.complaint, result={"seconds": reading.seconds})
     return Outcome(result=times(cell, reading, frames))
@@ -161,7 +162,7 @@ def build_scene(scene: Scene, context: Context) -> BuiltScene:
     return built
 
 
-def clocked_inputs(method: Method, scene: BuiltScene, *, least: float) -> Reading:
+def clocked_inputs(method: Method, scene: BuiltScene, *, min_time: float) -> Reading:
     """[s] a frame of what run() takes as ready, made frame after frame, as poses come in."""
     import numpy as np
 
@@ -176,7 +177,7 @@ def clocked_inputs(method: Method, scene: BuiltScene, *, least: float) -> Readin
         return np.zeros(1)
 
     make(0)  # whatever is loaded or compiled at first
-    _, reading = clocked(all_frames, of=lambda images: images, least=least)
+    _, reading = clocked(all_frames, read=lambda images: images, min_time=min_time)
     return replace(reading, runs=tuple(seconds / frames for seconds in reading.runs))
 
 
@@ -192,8 +193,8 @@ def judge(
     import numpy as np
 
     reason = " ".join(trajectory.reason.split())
-    if wrong := misshapen(trajectory.positions, scene, other_mesh=other_mesh):
-        return "failed", f"run() {wrong}"
+    if fault := misshapen(trajectory.positions, scene, other_mesh=other_mesh):
+        return "failed", f"run() {fault}"
     if reading.complaint:
         return "failed", UNBELIEVABLE + reading.complaint
     if not np.isfinite(trajectory.positions).all():
@@ -204,8 +205,8 @@ def judge(
     if trajectory.status == "max_iterations":
         return ("ok", "") if truncated else ("stalled", reason)
     if trajectory.status not in STATUSES:
-        known = ", ".join(STATUSES)
-        return "failed", f"unknown status '{trajectory.status}', use one of {known}; {reason}"
+        names = ", ".join(STATUSES)
+        return "failed", f"unknown status '{trajectory.status}', use one of {names}; {reason}"
     status = "ok" if trajectory.status == "converged" else trajectory.status
     if status != "ok" and not truncated and "converged" in trajectory.frame_fields:
         bad = int((trajectory.frame_fields["converged"] < 0.5).sum())

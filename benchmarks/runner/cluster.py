@@ -74,7 +74,7 @@ class Cluster:
 
     @property
     def slots(self) -> int:
-        """Number of batches that are done at once. Without a worker the first one waits for it."""
+        """Number of batches done at once. Without a worker the first one waits for it."""
         if self.client.status == "running":
             with suppress(OSError):  # no scheduler: the client is looking for it
                 return max(1, sum(self.client.nthreads().values()))
@@ -90,14 +90,14 @@ class Cluster:
             outcome, worker = self._outcome(task, needed, worker)
             yield outcome
 
-    def _outcome(self, task: Task, needed: Needed, near: str) -> tuple[Outcome, str]:
-        """Return the outcome of a task and the address of its worker. near: of the one that is preferred."""
+    def _outcome(self, task: Task, needed: Needed, address: str) -> tuple[Outcome, str]:
+        """Return the outcome of a task and the address of its worker. address: of the preferred one."""
         work = pickle.dumps((task, needed, software_of(task)))
         while True:
             try:
                 future = self.client.submit(
                     do_task, self.assets, work, key=f"{task.kind}-{uuid.uuid4().hex}", pure=False,
-                    workers=[near] if near else None, allow_other_workers=bool(near),
+                    workers=[address] if address else None, allow_other_workers=bool(address),
                 )  # fmt: skip
                 return future.result()
             except RunStopped:
@@ -119,13 +119,13 @@ class Cluster:
         self.client.close()
 
     def rest(self) -> None:
-        """End the processes of the run's folder on all workers, those of a command that was killed too."""
+        """End the processes of the run's folder on all workers, those of a killed command too."""
         if self.client.status == "running":
             with suppress(OSError):  # no scheduler: its workers end by themselves
                 self.client.run(end_processes, self.folder, on_error="ignore")
 
     def close(self) -> None:
-        """End everything that was begun on the cluster."""
+        """End all that was begun on the cluster."""
         self.stop()
         self.assets.unlink(missing_ok=True)
 
@@ -180,8 +180,8 @@ def _process_of(assets: Path) -> TaskProcess:
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     one_thread()
     thread = threading.get_ident()
-    known, process = _processes.get(thread, (None, None))
-    if process is None or known != assets:
+    old_assets, process = _processes.get(thread, (None, None))
+    if process is None or old_assets != assets:
         if process is not None:
             process.close()
         process = TaskProcess(RunFolder(assets.parent), pickle.loads(assets.read_bytes()))

@@ -41,9 +41,9 @@ def execute(plan: Plan, assets: Assets | None = None) -> int:
     """
     tasks = tasks_of(plan)
     networks = [task for task in tasks if task.kind == "network"]
-    given = [task for task in networks if task.inputs.get("file")]
-    if given and all(task.skip for task in networks):
-        raise RunRefused(given[0].skip)  # all else is there to be compared with them
+    readers = [task for task in networks if task.inputs.get("file")]
+    if readers and all(task.skip for task in networks):
+        raise RunRefused(readers[0].skip)  # all else is there to be compared with them
     log = RunLog(plan)
     runner = Runner(tasks, log.cache)
     if plan.garments:
@@ -68,9 +68,9 @@ def execute(plan: Plan, assets: Assets | None = None) -> int:
     lines = [*ends, *runner.broken()]
     if failures := len(lines):
         lines[MOST_FAILURES:] = ["more in results.csv and run.json"] * (failures > MOST_FAILURES)
-    ran = {row.method for row in log.rows if row.status != "skipped"}
+    methods = {row.method for row in log.rows if row.status != "skipped"}
     lines += {
-        r.method: f"{r.method}: skipped: {r.reason}" for r in log.rows if r.method not in ran
+        r.method: f"{r.method}: skipped: {r.reason}" for r in log.rows if r.method not in methods
     }.values()
     if runner.reused:
         lines.append(f"{len(runner.reused)} results taken from earlier runs in this folder")
@@ -84,11 +84,11 @@ def ends_with(folder: RunFolder, rows: Sequence[Row]) -> Iterator[str]:
     """Yield the paths of a run's page, PDF and rows, and commands that may come next."""
     for path in (folder.page_path, folder.report_path, folder.rows_path):
         yield f"{path.suffix[1:]:4}  {path.resolve()}"
-    seen = [row for row in rows if row.status in USABLE and row.metric == "cost/frame"]
-    if seen:
-        methods = list(dict.fromkeys(row.method for row in seen if row.scene == seen[0].scene))
-        shown = f"--scene {seen[0].scene} --methods {','.join(methods[:4])}"
-        yield f"film  python -m reports.film {folder.path} {shown} -o film.gif"
+    costs = [row for row in rows if row.status in USABLE and row.metric == "cost/frame"]
+    if costs:
+        methods = list(dict.fromkeys(row.method for row in costs if row.scene == costs[0].scene))
+        options = f"--scene {costs[0].scene} --methods {','.join(methods[:4])}"
+        yield f"film  python -m reports.film {folder.path} {options} -o film.gif"
     yield f"beside another run  python -m reports.compare {folder.path} OTHER"
     yield "more motions and methods  python -m benchmarks.run full"
 
@@ -187,7 +187,7 @@ def describe(plan: Plan) -> str:
     """Return the plan in a few lines, and one line for each task. Starts nothing, writes nothing."""
     folder = RunFolder(plan.folder / "none" if plan.fresh else plan.folder)
     study, skipped, stage = plan.study, sum(not runs(cell) for cell in plan.cells), ""
-    tasks_to_run: list[Task] = []
+    todo: list[Task] = []
     lines = [
         f"preset {study.sizes.name}: {study.sizes.description}",
         f"folder {plan.folder}",
@@ -197,13 +197,13 @@ def describe(plan: Plan) -> str:
         f"{len(plan.cells)} cells, {skipped} skipped, {len(plan.cases)} cases",
     ]
     counts: Counter[str] = Counter()
-    for task, why, outcome in Runner(tasks_of(plan), Cache(folder, retry=plan.retry)).preview():
+    for task, reason, outcome in Runner(tasks_of(plan), Cache(folder, retry=plan.retry)).preview():
         if task.stage != stage:
             stage = task.stage
             lines.append(stage)
         state = "run" if outcome is None else "cached" if outcome.content else "skip"
-        lines.append(f"  {task.title}: {state}" + f" ({why})" * bool(why))
+        lines.append(f"  {task.title}: {state}" + f" ({reason})" * bool(reason))
         counts[state] += 1
-        tasks_to_run += [task] * (state == "run")
-    time_left = Progress(tasks_to_run, plan.workers).time_left()
+        todo += [task] * (state == "run")
+    time_left = Progress(todo, plan.workers).time_left()
     return "\n".join([*lines, f"{counts['run']} tasks to run, {time_left}; {counts['cached']} cached"])

@@ -52,7 +52,7 @@ class LocalProcesses:
             process.stop()
 
     def rest(self) -> None:
-        """End all processes, none of which is at work; others begin where they are needed."""
+        """End all processes, none of which is at work; others begin where needed."""
         while self._all:
             self._all.pop().close()
         self._idle.clear()
@@ -97,12 +97,12 @@ class Executor:
                     while len(at_work) < self.back_end.slots and (batch := ready()):
                         at_work.add(threads.submit(do, *batch))
                     try:
-                        done = finished.get(timeout=POLL if at_work else 0.0)
+                        result = finished.get(timeout=POLL if at_work else 0.0)
                     except queue.Empty:
                         if not at_work:
                             break
                         continue
-                    yield done
+                    yield result
             except BaseException as error:
                 stopped.set()
                 while at_work := {f for f in at_work if not (f.cancel() or f.done())}:

@@ -87,24 +87,25 @@ def simulate_clips(
 
     assets, run = context.assets, context.folder
     assert assets is not None
-    kept: dict[str, Any] = {}
+    arrays: dict[str, Any] = {}
     left_out: dict[str, str] = {}
-    given, vertices = assets.named(motions), len(assets.garments[scene.garment].rest_positions)
-    before, clips = (make_shared_clips(given, share, vertices=vertices) for share in (part, part + 1))
+    sources = assets.named(motions)
+    vertices = len(assets.garments[scene.garment].rest_positions)
+    before, clips = (make_shared_clips(sources, share, vertices=vertices) for share in (part, part + 1))
     for clip in clips[len(before) :]:
         positions, reason = simulated_clip(clip, scene, entry, context)
         if reason:
             left_out[clip.name] = reason
         else:
-            kept[clip.name] = positions.astype(np.float32)  # as networks see it
+            arrays[clip.name] = positions.astype(np.float32)  # as networks see it
     path = run.curves_path(clips_of(scene.garment, motions), f"{entry.name}-{part}")
     with replacing(path) as temporary:
-        np.savez(temporary, **kept)
-    return Outcome(result={"clips": list(kept), "left_out": left_out}, files=(run.relative(path),))
+        np.savez(temporary, **arrays)
+    return Outcome(result={"clips": list(arrays), "left_out": left_out}, files=(run.relative(path),))
 
 
 def clips_of(garment: str, motions: tuple[str, ...]) -> str:
-    """Return the name of the clips that are mixed from so many motions."""
+    """Return the name of the clips mixed from so many motions."""
     return f"{garment}/mixed-{len(motions)}"
 
 
@@ -116,15 +117,15 @@ def simulated_clip(
 
     assets = context.assets
     assert assets is not None
-    alone = replace(assets, motions={clip.name: clip}, clips={})
-    built = replace(scene, name=f"{scene.garment}/{clip.name}", motion=clip.name).build(alone)
+    assets = replace(assets, motions={clip.name: clip}, clips={})
+    built = replace(scene, name=f"{scene.garment}/{clip.name}", motion=clip.name).build(assets)
     try:
         trajectory = simulated(built, entry, context.folder)
     except RuntimeError as error:  # a pose that leaves the cloth no room
         return np.empty(0), str(error) or type(error).__name__
-    done = trajectory.status == "converged" or entry.truncated
+    usable = trajectory.status == "converged" or entry.truncated
     whole = trajectory.frames == clip.frames and np.isfinite(trajectory.positions).all()
-    return trajectory.positions, "" if done and whole else f"{trajectory.status}: {trajectory.reason}"
+    return trajectory.positions, "" if usable and whole else f"{trajectory.status}: {trajectory.reason}"
 
 
 def simulated(scene: BuiltScene, entry: MethodEntry, folder: RunFolder) -> Trajectory:
@@ -151,6 +152,6 @@ def simulate_quasi_static(scene: Scene, context: Context, needed: Needed) -> Out
         reason = f"ended after {trajectory.frames} of {built.frames} frames: {trajectory.reason}"
         return Outcome("diverged", reason, failed=True)
     trajectory.save(path)
-    left = int((trajectory.frame_fields["converged"] == 0.0).sum())
-    result = {"status": trajectory.status, "frames_not_converged": left}
+    count = int((trajectory.frame_fields["converged"] == 0.0).sum())
+    result = {"status": trajectory.status, "frames_not_converged": count}
     return Outcome(result=result, files=(context.folder.relative(path),))

@@ -108,9 +108,9 @@ class TaskProcess:
         return answer
 
     def _start(self) -> None:
-        self._pipe, far = self._context.Pipe()
-        process = self._context.Process(target=_serve, args=(far, *self._known), daemon=True)
-        with far:
+        self._pipe, peer = self._context.Pipe()
+        process = self._context.Process(target=_serve, args=(peer, *self._known), daemon=True)
+        with peer:
             process.start()
         self._process = process
 
@@ -142,8 +142,8 @@ def how_it_ended(code: int) -> tuple[str, str]:
     """
     if code == -signal.SIGKILL:
         return "the process was killed by SIGKILL: the system was out of memory", "out-of-memory"
-    how = f"status {code}" if code >= 0 else signal.Signals(-code).name
-    return f"the process ended with {how}", "failed"
+    cause = f"status {code}" if code >= 0 else signal.Signals(-code).name
+    return f"the process ended with {cause}", "failed"
 
 
 def end_group(pid: int) -> None:

@@ -41,8 +41,8 @@ class Runner:
         unknown = [task for task in self.tasks if task.id not in self.outcomes]
         try:
             with Progress(unknown, executor.back_end.slots) as self.progress:
-                while left := [task for task in unknown if task.id not in self.outcomes]:
-                    tasks = _able(left, timed=False) or _able(left, timed=True)
+                while rest := [task for task in unknown if task.id not in self.outcomes]:
+                    tasks = _able(rest, timed=False) or _able(rest, timed=True)
                     (self._alone if tasks[0].process else self._side_by_side)(tasks, executor)
         finally:
             executor.close()
@@ -54,8 +54,8 @@ class Runner:
         def ready() -> Batch | None:
             for batch in filter(self._is_ready, list(waiting)):
                 waiting.remove(batch)
-                if wanted := [task for task in batch if self.decide(task)]:
-                    return wanted, self._needed(*wanted)
+                if todo := [task for task in batch if self.decide(task)]:
+                    return todo, self._needed(*todo)
             return None
 
         for task, outcome in executor.together(ready):
@@ -118,19 +118,19 @@ class Runner:
     def _keep(self, task: Task, outcome: Outcome) -> None:
         """Write the outcome into the cache; one that cannot be written is a failure."""
         try:
-            kept = self.cache.keep(task, outcome, self.outcomes)
+            entry = self.cache.keep(task, outcome, self.outcomes)
         except (TypeError, ValueError, OSError) as error:
             # a result that is no plain value, a file not there
-            kept = self.cache.keep(task, failure(error), self.outcomes)
-        self.outcomes[task.id] = kept
+            entry = self.cache.keep(task, failure(error), self.outcomes)
+        self.outcomes[task.id] = entry
         self.progress.end(task, outcome.seconds)
 
     def preview(self) -> Iterator[tuple[Task, str, Outcome | None]]:
         """Yield each task and what `_find` says. One that would be run is taken to succeed."""
         for task in self.tasks:
-            why, outcome = self._find(task)
+            reason, outcome = self._find(task)
             self.outcomes[task.id] = outcome or Outcome(content="out of date")
-            yield task, why, outcome
+            yield task, reason, outcome
 
     def broken(self) -> list[str]:
         """Return how tasks failed that have no row."""

@@ -32,7 +32,7 @@ def measure_cell(
         cell: what is measured.
         cells: all of the scene, in the order of their roll-outs; those that are needed are compared with.
         gap_samples: frames in which the energy gap is measured.
-        outside: files of metrics that are not the project's, measured in every scene.
+        outside: files of metrics not the project's, measured in every scene.
         context: the roll-outs of a batch share search trees, and the energies of references.
         needed: outcomes of the cells, of the quasi-static solution, and of the method in another scene.
     """
@@ -95,26 +95,26 @@ def measured(
     metrics: dict[str, float | Estimate] = {}
     curves: dict[str, np.ndarray] = {}
     ended = ("ok", "")
-    judged = len(roll_out.positions) > roll_out.scene.warm_up
+    has_frames = len(roll_out.positions) > roll_out.scene.warm_up
     if roll_out.entry.other_mesh:
-        chosen_ones = [measurements for measurements in MEASUREMENTS if measurements.other_meshes]
+        entries = [entry for entry in MEASUREMENTS if entry.other_meshes]
     else:
-        chosen_ones = [*measured_in(chosen), *map(measurements_in, outside)]
-    for measurements in chosen_ones if judged else ():
-        suites = measurements.suites or roll_out.suites
+        entries = [*measured_in(chosen), *map(measurements_in, outside)]
+    for entry in entries if has_frames else ():
+        suites = entry.suites or roll_out.suites
         if not any(suite in suites for suite in roll_out.suites):
             continue
         try:
-            values = dict(measurements.measure(roll_out)) if measurements.measure else {}
-            if measurements.compare:
-                values |= compared(roll_out, measurements.compare)
+            values = dict(entry.measure(roll_out)) if entry.measure else {}
+            if entry.compare:
+                values |= compared(roll_out, entry.compare)
             metrics |= {find_metric(name, outside).name: number(name, v) for name, v in values.items()}
-            curves |= measurements.series(roll_out) if measurements.series else {}
-            ended = (measurements.judge(roll_out, values) if measurements.judge else None) or ended
+            curves |= entry.series(roll_out) if entry.series else {}
+            ended = (entry.judge(roll_out, values) if entry.judge else None) or ended
             if ended[0] not in STATUSES:
                 raise ValueError(f"judge() gives {ended!r}: expected None, or a status and a reason")
         except Exception as error:
-            raise RuntimeError(f"{measurements.name}: {one_line(error)}") from error
+            raise RuntimeError(f"{entry.name}: {one_line(error)}") from error
     return metrics, curves, ended
 
 
@@ -138,9 +138,9 @@ def compared(
     others = {other.entry.name: compare(roll_out, other) for other in twins}
     estimates: dict[str, float | Estimate] = {}
     for name, value in values.items():
-        moved = {twin: beside[name] - value for twin, beside in others.items() if name in beside}
-        known = noise(moved)
-        uncertainty = math.nan if known is None else known
+        moved = {twin: row[name] - value for twin, row in others.items() if name in row}
+        spread = noise(moved)
+        uncertainty = math.nan if spread is None else spread
         estimates[name] = Estimate(value, uncertainty, tuple(moved.items())) if moved else value
     return estimates
 

@@ -151,7 +151,7 @@ def origin_of(job: NetworkTraining, needed: Needed, *, left_out: list[str]) -> d
 def mixed_clips(
     job: NetworkTraining, assets: Assets, folder: RunFolder, needed: Needed
 ) -> tuple[list[Motion], dict[str, np.ndarray]]:
-    """Return the augmented clips that were simulated, and their vertices (T,V,3) [m] by name."""
+    """Return the simulated augmented clips, and their vertices (T,V,3) [m] by name."""
     from reference_sim.files.array_file import read_arrays
     from snug.training.augmentation import make_shared_clips
 

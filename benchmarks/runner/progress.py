@@ -64,12 +64,12 @@ class Progress:
         """Return how long the rest may take, in words: no more than it said before."""
         pace = {kind: self.seconds[kind] / self.expected[kind] for kind in list(self.expected)}
         usual = sum(self.seconds.values()) / sum(self.expected.values()) if pace else 1.0
-        now, since, left = time.monotonic(), dict(self.since), REPORT + self.compiling * (not pace)
+        now, since, total = time.monotonic(), dict(self.since), REPORT + self.compiling * (not pace)
         for task in list(self.left.values()):
             seconds = expected_of(task) * pace.get(task.kind, usual)
             seconds = max(seconds - (now - since.pop(task.batch_id, now)), 0.0)
-            left += seconds if task.process else seconds / self.workers
-        self.shown = min(self.shown, left)
+            total += seconds if task.process else seconds / self.workers
+        self.shown = min(self.shown, total)
         minutes = self.shown / 60.0
         return f"about {math.ceil(minutes)} min left" if minutes > 1.0 else "less than a minute left"
 

@@ -120,17 +120,18 @@ def clock_costs(cell: Cell, repeats: int, outcomes: Outcomes) -> tuple[dict[str,
 
     Times are medians of the repeats; those of inputs, and the peak, are of the first run.
     """
-    first, remark = outcomes[cell.id()], ""
+    first = outcomes[cell.id()]
+    remark = ""
     batch = outcomes.get(cell.id("batch"), Outcome("skipped"))
     if batch.status not in ("ok", "skipped"):
         remark = f"many at once: {batch.status}: {batch.reason}"
     results = [first.result]
     for number in range(1, repeats):
-        again = outcomes.get(cell.id("repeat", number), Outcome("skipped"))
-        if again.status == "ok":
-            results.append(again.result)
-        elif again.status != "skipped":
-            remark = remark or f"repeat {number}: {again.status}: {again.reason}"
+        repeat = outcomes.get(cell.id("repeat", number), Outcome("skipped"))
+        if repeat.status == "ok":
+            results.append(repeat.result)
+        elif repeat.status != "skipped":
+            remark = remark or f"repeat {number}: {repeat.status}: {repeat.reason}"
     seconds = [result["seconds"] for result in results]
     costs = {"cost/frame": MS * median(seconds) / first.result["frames"]}
     if "inputs" in first.result:
@@ -175,8 +176,8 @@ def with_remarks(reason: str, network: Outcome) -> str:
     facts = network.result
     if not reason and facts.get("left_out"):
         reason = f"its network learned without {', '.join(facts['left_out'])}: no simulation is whole"
-    taken = f"{PRETRAINED} {facts[NAME]} of {facts['trained_at']}" if NAME in facts else ""
-    return "; ".join(filter(None, (reason, taken)))
+    source = f"{PRETRAINED} {facts[NAME]} of {facts['trained_at']}" if NAME in facts else ""
+    return "; ".join(filter(None, (reason, source)))
 
 
 def _rows_of_case(case: Case, outcomes: Outcomes) -> Iterator[Row]:

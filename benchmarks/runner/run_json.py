@@ -119,9 +119,9 @@ class RunLog:
         role_of = self.plan.motions.role_of
         tests = {scene.name for scene in self.plan.scenes if role_of(scene.motion) == "test"}
         rows = [row for row in self.rows if row.scene in tests]
-        seen = [[row.scene, row.method, row.seed, row.metric, row.value] for row in rows]
-        look = {"started": self.config["started"], "commit": self.origin["commit"], "rows": digest(seen)}
-        if seen and look["rows"] not in [earlier.get("rows") for earlier in self.config["test_looks"]]:
+        facts = [[row.scene, row.method, row.seed, row.metric, row.value] for row in rows]
+        look = {"started": self.config["started"], "commit": self.origin["commit"], "rows": digest(facts)}
+        if facts and look["rows"] not in [earlier.get("rows") for earlier in self.config["test_looks"]]:
             self.config["test_looks"] = [*self.config["test_looks"], look]
 
 

@@ -41,8 +41,7 @@ from snug.trained import FOLDER
 if TYPE_CHECKING:
     from benchmarks.validation.case import Case
 
-# Code that an outcome depends on: whatever of it changes makes the outcome stale. A run also depends on
-# the modules of its method and its scene, see code_behind.
+# Code that makes an outcome stale when it changes; of a run also its method's and scene's: code_behind.
 RUNNING = (
     "reference_sim", "snug", "benchmarks/assets.py", "benchmarks/scene.py", "benchmarks/scenes",
     "benchmarks/meshes.py", "benchmarks/external", "benchmarks/method.py",
@@ -78,8 +77,8 @@ def code_behind(entry: MethodEntry | Scene) -> tuple[str, ...]:
 
 def users_code(*homes: str) -> tuple[str, ...]:
     """Return those that are files of users, by absolute paths, and what of ours such a file may import."""
-    own = tuple(home for home in homes if Path(home).is_absolute())
-    return (*own, *USERS_OWN) if own else ()
+    files = tuple(home for home in homes if Path(home).is_absolute())
+    return (*files, *USERS_OWN) if files else ()
 
 
 TRAINED = "training"  # the stage of networks that no file has
@@ -141,13 +140,13 @@ class Schedule:
             return []
         entry, garment = find_method(simulated.method), network.garment
         motions = self.plan.motions.train
-        given = [self.data(motion, garment, entry) for motion in motions]
+        tasks = [self.data(motion, garment, entry) for motion in motions]
         clips = (self.clips(garment, simulated, motions, part) for part in range(simulated.mixed))
-        return [*given, *clips]
+        return [*tasks, *clips]
 
     def data(self, motion: str, garment: str, entry: MethodEntry) -> Task:
         """Return the task that simulates a training motion."""
-        scene = of_garment(garment, self.plan.motions.worn).scene(motion).at(self.preset)
+        scene = of_garment(garment, self.plan.motions.garments).scene(motion).at(self.preset)
         return Task(
             kind="data", name=f"{flat(scene.name)}/{flat(entry.name)}", label=_label(scene.name, entry),
             stage="ground truth", silent=True, run=partial(simulate_motion, scene, entry),
@@ -158,7 +157,7 @@ class Schedule:
         """Return the task that simulates one part of the augmented clips of these motions."""
         entry = find_method(simulated.method)
         clips = clips_of(garment, motions)
-        scene = of_garment(garment, self.plan.motions.worn).scene(motions[0]).at(self.preset)
+        scene = of_garment(garment, self.plan.motions.garments).scene(motions[0]).at(self.preset)
         mixed_of = {name: self._motion(name) for name in motions}
         return Task(
             kind="clips", name=f"{flat(clips)}/{flat(entry.name)}-{part}",
@@ -255,13 +254,13 @@ class Schedule:
 
     def _timed(self, cell: Cell, id: TaskId, run: Callable[..., Outcome], **fields: Any) -> Task:
         """Return the run of a timed cell, or a task that follows it in its process."""
-        least = self._least(cell)
-        usual = {"inputs": {"least": least}, "code": RUNNING, "needs": (cell.id(),)}
-        more: dict[str, Any] = usual | fields
+        min_time = self._least(cell)
+        usual = {"inputs": {"least": min_time}, "code": RUNNING, "needs": (cell.id(),)}
+        fields = usual | fields
         return Task(
-            kind=id[0], name=id[1], label=cell.label, stage="timed methods", run=partial(run, cell, least),
+            kind=id[0], name=id[1], label=cell.label, stage="timed methods", run=partial(run, cell, min_time),
             process=cell.name, motion=cell.scene.motion if cell.scene.dressed else "",
-            deadline=self.preset.cell_seconds, **more,
+            deadline=self.preset.cell_seconds, **fields,
         )  # fmt: skip
 
     def _least(self, cell: Cell) -> float:
@@ -286,8 +285,8 @@ class Schedule:
             reads = (*reads, id_of("start", scene))  # the scene is built from it
         if scene.dynamic:
             reads = (*reads, id_of("quasi-static", scene))
-        wanted = (scene.counterpart, cell.method, cell.seed)
-        reads += tuple(c.id() for c in plan.cells if (c.scene.name, c.method, c.seed) == wanted)
+        key = (scene.counterpart, cell.method, cell.seed)
+        reads += tuple(c.id() for c in plan.cells if (c.scene.name, c.method, c.seed) == key)
         method = [
             entry.role, entry.reporting.family, entry.reporting.level, entry.static_known, entry.other_mesh,
         ]  # fmt: skip
@@ -353,9 +352,10 @@ class Schedule:
     def _settled_in(self, scene: Scene) -> Scene:
         """Return the scene whose settled garment another one starts from."""
         planned = next((s for s in self.plan.scenes if s.name == scene.start_of), None)
-        return planned or find_scene(scene.start_of, self.plan.motions.worn[0].garment).at(self.preset)
+        garment = self.plan.motions.garments[0].garment
+        return planned or find_scene(scene.start_of, garment).at(self.preset)
 
 
-def _label(what: str, entry: MethodEntry) -> str:
+def _label(text: str, entry: MethodEntry) -> str:
     """Return a label that names the method unless it is the reference."""
-    return what if entry.role == "reference" else f"{what} by {entry.name}"
+    return text if entry.role == "reference" else f"{text} by {entry.name}"

@@ -1,4 +1,4 @@
-"""A task: work that is done once and kept, with its inputs, its needs and its outcome."""
+"""A task: work done once and kept, with its inputs, its needs and its outcome."""
 
 from __future__ import annotations
 

@@ -44,8 +44,8 @@ def write_training_motions(garment: str, plan: Plan, out: Path) -> list[str]:
         for task in runner.tasks:
             outcome = runner.outcomes[task.id]
             if outcome.failed or not outcome.result["whole"]:
-                why = outcome.reason or outcome.result.get("reason", "")
-                raise StudyError(f"training motion {task.label}: {outcome.status}: {why}")
+                reason = outcome.reason or outcome.result.get("reason", "")
+                raise StudyError(f"training motion {task.label}: {outcome.status}: {reason}")
             files[outcome.result["motion"]] = outcome.files[0]
         simulations = (
             (assets.motions[name], Trajectory.load(run.path / file).positions)

@@ -187,8 +187,8 @@ def find_scene(name: str, garment: str = "tshirt") -> Scene:
 
 def further_scenes(garment: str) -> tuple[Scene, ...]:
     """Return FURTHER_SCENES with that garment on the body, but for those that tailor another."""
-    kept = (s for s in FURTHER_SCENES if not s.own_garment or s.garment == garment)
-    return tuple(replace(scene, garment=garment) for scene in kept)
+    scenes = (s for s in FURTHER_SCENES if not s.own_garment or s.garment == garment)
+    return tuple(replace(scene, garment=garment) for scene in scenes)
 
 
 @dataclass(frozen=True)
@@ -206,10 +206,10 @@ class GarmentScenes:
 
     def scene(self, motion: str, part: str = "whole") -> Scene:
         """Return the scene of a body in this garment doing that motion, or its liveliest part."""
-        of = " (its liveliest part)" if part == "clip" else ""
+        note = " (its liveliest part)" if part == "clip" else ""
         return Scene(
             name=f"{self.garment}/{motion}" + ("@clip" if part == "clip" else ""),
-            description=f"a body in {self.title}: {motion}{of}",
+            description=f"a body in {self.title}: {motion}{note}",
             module="benchmarks.scenes.dressed_body:build_dressed_body",
             sizes=("settle_frames", "warm_up_frames"),
             garment=self.garment,
@@ -231,34 +231,34 @@ GARMENT_SCENES = (
 )
 
 
-def of_garment(garment: str, worn: tuple[GarmentScenes, ...] = GARMENT_SCENES) -> GarmentScenes:
+def of_garment(garment: str, garments: tuple[GarmentScenes, ...] = GARMENT_SCENES) -> GarmentScenes:
     """Return the scenes of that garment. Raises DeclarationError."""
-    known = {scenes.garment: scenes for scenes in worn}
-    if garment not in known:
-        raise DeclarationError(f"no garment is called '{garment}'; there are {', '.join(known)}")
-    return known[garment]
+    index = {scenes.garment: scenes for scenes in garments}
+    if garment not in index:
+        raise DeclarationError(f"no garment is called '{garment}'; there are {', '.join(index)}")
+    return index[garment]
 
 
 def all_scenes(
     motions: Iterable[str],
     dynamic_motions: Iterable[str],
-    worn: tuple[GarmentScenes, ...] = GARMENT_SCENES,
+    garments: tuple[GarmentScenes, ...] = GARMENT_SCENES,
 ) -> dict[str, Scene]:
     """Return every scene by name: those without a body, then dressed bodies in each motion and in its clip.
 
     motions: those of the T-shirt, which can do the others too; dynamic_motions: those of garments that
     swing.
-    worn: the garments, the first in place of the T-shirt.
+    garments: the first is in place of the T-shirt.
     """
     motions, dynamic = list(motions), list(dynamic_motions)
-    first = worn[0].garment
+    first = garments[0].garment
     varied = [
         s for motion in motions[:1] for s in (there_and_back(motion, first), *shapes(motion, first))
     ]
     every = list(dict.fromkeys((*motions, *dynamic)))
     dressed = [
         scenes.scene(motion, part)
-        for scenes in worn
+        for scenes in garments
         for motion in (dynamic if scenes.dynamic else every)
         for part in ("whole", "clip")
     ]

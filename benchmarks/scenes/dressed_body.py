@@ -75,7 +75,7 @@ def build_dressed_body(
     )  # fmt: skip
 
 
-def worn(scene: Scene, dressed: Dressed, **further: Any) -> BuiltScene:
+def worn(scene: Scene, dressed: Dressed, **fields: Any) -> BuiltScene:
     """Return the scene of a garment on a moving body, with further fields of BuiltScene."""
     body, garment, motion, shape = dressed.body, dressed.garment, dressed.motion, dressed.betas
     posed = body.vertices(motion.poses, motion.translations, shape)
@@ -89,7 +89,7 @@ def worn(scene: Scene, dressed: Dressed, **further: Any) -> BuiltScene:
         origin_heights=dressed.pelvis[:, 1],
         dressed=dressed,
         pin_positions=handles.__getitem__ if len(garment.pins) else None,
-        **further,
+        **fields,
     )
 
 

@@ -143,11 +143,11 @@ def build_long_motion(scene: Scene, assets: Assets, *, loop_frames: int = 0) -> 
     """Build the scene of the motion in a loop of `loop_frames`, or there and back without that number."""
     if loop_frames:
         motion, early, late = looped(make_motion(scene.motion), loop_frames)
-        kept = np.unique(np.concatenate([np.arange(0, loop_frames, EVERY), early, late]))
+        frames = np.unique(np.concatenate([np.arange(0, loop_frames, EVERY), early, late]))
     else:
         motion = repeated_there_and_back(assets.motion(scene.motion, "whole"))
         early, late = np.arange(ENDS), np.arange(motion.frames - ENDS, motion.frames)
-        kept = np.concatenate([early, late])
+        frames = np.concatenate([early, late])
     garment = assets.garments[scene.garment]
     cloth = garment.cloth()
     return BuiltScene(
@@ -155,11 +155,11 @@ def build_long_motion(scene: Scene, assets: Assets, *, loop_frames: int = 0) -> 
         cloth=cloth,
         energies=(StretchStVK(cloth), BendHinge(cloth), Gravity(cloth)),
         dt=1.0 / motion.fps,
-        frames=len(kept),
+        frames=len(frames),
         settle=lambda: cloth.rest_positions,
         dressed=Dressed(assets.body, garment, motion),
-        kept=kept,
-        repeated=(np.searchsorted(kept, early), np.searchsorted(kept, late)),
+        kept=frames,
+        repeated=(np.searchsorted(frames, early), np.searchsorted(frames, late)),
     )
 
 

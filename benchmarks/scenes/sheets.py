@@ -29,14 +29,14 @@ SWING, PERIOD = 0.15, 1.0  # [m] to either side, [s] of the flag's pole
 RADIUS, DRAPED_SIZE, GAP = 0.12, 0.5, 0.02
 
 
-def _built(scene: Scene, cloth: Cloth, frames: int, start: np.ndarray, **further: Any) -> BuiltScene:
+def _built(scene: Scene, cloth: Cloth, frames: int, start: np.ndarray, **fields: Any) -> BuiltScene:
     """Return the scene of strain, bending and weight, without `energies`, with further fields."""
-    if "energies" not in further:
+    if "energies" not in fields:
         from reference_sim.energies.bend_hinge import BendHinge  # a scene without it does not load it
         from reference_sim.energies.stretch_stvk import StretchStVK
 
-        further["energies"] = (StretchStVK(cloth), BendHinge(cloth), Gravity(cloth))
-    return BuiltScene(name=scene.name, cloth=cloth, dt=DT, frames=frames, settle=lambda: start, **further)
+        fields["energies"] = (StretchStVK(cloth), BendHinge(cloth), Gravity(cloth))
+    return BuiltScene(name=scene.name, cloth=cloth, dt=DT, frames=frames, settle=lambda: start, **fields)
 
 
 def build_free_fall(

@@ -76,18 +76,18 @@ class Case:
 
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", SlowPathWarning)  # a case is not timed
-                measured = getattr(load(self.module), self.function)(**self.options)
-            if isinstance(measured, Mapping):
-                measured = measured[self.name]
-            if not isinstance(measured, Measurement):
-                value, expected = measured if isinstance(measured, tuple) else (measured, self.expected)
-                measured = self.judged(float(value), None if expected is None else float(expected))
+                answer = getattr(load(self.module), self.function)(**self.options)
+            if isinstance(answer, Mapping):
+                answer = answer[self.name]
+            if not isinstance(answer, Measurement):
+                value, expected = answer if isinstance(answer, tuple) else (answer, self.expected)
+                answer = self.judged(float(value), None if expected is None else float(expected))
         except Exception as error:
-            measured = Measurement(reason=f"{type(error).__name__}: {error}")
+            answer = Measurement(reason=f"{type(error).__name__}: {error}")
         return Row(
             self.suite, self.scene or self.name, self.method, 0, self.metric, self.unit,
-            value=measured.value, status=measured.status, reason=measured.reason, terms=measured.terms,
-            expected=self.expected if measured.expected is None else measured.expected,
+            value=answer.value, status=answer.status, reason=answer.reason, terms=answer.terms,
+            expected=self.expected if answer.expected is None else answer.expected,
             tolerance=self.tolerance,
         )  # fmt: skip
 

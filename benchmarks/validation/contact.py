@@ -148,8 +148,8 @@ def _leaving(rate: int) -> float:
     press = (np.maximum(contact.margin - outside, 0.0) ** 2).mean(axis=1)
     # The force falls to zero along a line in cos theta: follow it from where a tenth to a third is left.
     share = press / press[0]
-    left = np.flatnonzero((share > 0.1) & (share < 0.33))
-    return float(np.polyval(np.polyfit(share[left], cosine[left], 2), 0.0))
+    tail = np.flatnonzero((share > 0.1) & (share < 0.33))
+    return float(np.polyval(np.polyfit(share[tail], cosine[tail], 2), 0.0))
 
 
 @known_answer(expected=0.0, tolerance=5e-3, reason="120 cells, and one of contact at each end of the arc")

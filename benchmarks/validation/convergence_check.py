@@ -34,35 +34,35 @@ def solve_and_check(potential: sim.Potential, guess: np.ndarray) -> Measurement:
 
 def check_result(potential: sim.Potential, guess: np.ndarray, result: sim.Result) -> Measurement:
     """Check the solver's claim; the value of the row is the relative residual, computed independently."""
-    measured = partial(Measurement, terms="+".join(energy.name for energy in potential.energies))
+    measure = partial(Measurement, terms="+".join(energy.name for energy in potential.energies))
     status, x = STATUS.get(result.status, result.status), result.positions
     if not np.isfinite(x).all():
-        return measured(reason=f"positions that are not finite are called {result.status}")
+        return measure(reason=f"positions that are not finite are called {result.status}")
     if not np.array_equal(x[potential.cloth.pins], guess[potential.cloth.pins]):
-        return measured(reason="pinned vertices moved")
+        return measure(reason="pinned vertices moved")
     if status == "diverged" and not np.isfinite(energy_of(potential, guess)[0]):
-        return measured(status=status, reason=result.reason)
+        return measure(status=status, reason=result.reason)
     optimum = optimality_of(potential, x)
     if not np.isfinite(optimum.residual):
-        return measured(reason=f"a gradient that is not finite is called {result.status}")
-    measured = partial(measured, value=optimum.residual)
+        return measure(reason=f"a gradient that is not finite is called {result.status}")
+    measure = partial(measure, value=optimum.residual)
     (before, size), (after, _) = energy_of(potential, guess), energy_of(potential, x)
     if not after <= before + EVALUATION_ROUND_OFF * size:
-        return measured(reason=f"the energy rose from {before:.17g} to {after:.17g} J")
+        return measure(reason=f"the energy rose from {before:.17g} to {after:.17g} J")
     if status != "ok":
         areas = corner_areas(x[potential.cloth.faces])
         lost = int((areas < COLLAPSED * potential.cloth.areas).sum())
         collapse = f"; {lost} triangles collapsed, where a hinge's energy jumps: no minimum need exist"
         reason = f"{result.reason} ({result.iterations} iterations){collapse if lost else ''}"
-        return measured(status=status, reason=reason)
+        return measure(status=status, reason=reason)
     if optimum.residual > max(RELATIVE_RESIDUAL, optimum.round_off):
-        return measured(reason=f"claims convergence at a relative residual of {optimum.residual:.3g}")
+        return measure(reason=f"claims convergence at a relative residual of {optimum.residual:.3g}")
     if optimum.lowest_curvature < -optimum.zero_curvature:
-        return measured(
+        return measure(
             reason=f"claims convergence on a saddle: curvature {optimum.lowest_curvature:.3g} N/m"
         )
     excused = "; tolerance at round-off" if optimum.residual > RELATIVE_RESIDUAL else ""
-    return measured(status="ok", reason=f"{result.iterations} iterations{excused}")
+    return measure(status="ok", reason=f"{result.iterations} iterations{excused}")
 
 
 def energy_of(potential: sim.Potential, x: np.ndarray) -> tuple[float, float]:

@@ -78,7 +78,7 @@ def demand_converged(solved: Solved, name: str) -> Solved:
 
 
 def minimum(terms: Sequence[energies.Energy], start: np.ndarray, **options: Any) -> np.ndarray:
-    """Return the minimum (V, 3) [m] of the sum of these terms that is found from `start` (V, 3) [m].
+    """Return the minimum (V, 3) [m] of the sum of these terms found from `start` (V, 3) [m].
 
     options: of `minimise`. Raises RuntimeError unless it converged.
     """

@@ -68,10 +68,10 @@ def belt_path(substeps: int = 1) -> float:
     along = np.array([BELT * DT, 0.0, 0.0]) * np.arange(16)[:, None, None]
     path = _patch(carried=along, frames=16, substeps=substeps)[:, 0]
     dt = DT / substeps
-    behind = _slip(BELT / SPEED, 0.0, dt * MU * sim.GRAVITY / SPEED, steps=15 * substeps, dt=dt)[
+    offset = _slip(BELT / SPEED, 0.0, dt * MU * sim.GRAVITY / SPEED, steps=15 * substeps, dt=dt)[
         ::substeps
     ]
-    return float(np.abs(path - path[0] - (along[:, 0, 0] - behind)).max())
+    return float(np.abs(path - path[0] - (along[:, 0, 0] - offset)).max())
 
 
 @known_answer(
@@ -83,8 +83,8 @@ def friction_landing() -> float:
     The table gives it the momentum m (v_n + g t) upwards, and takes mu times that of its sliding.
     """
     path = _patch(frames=16, velocity=np.array([THROWN, -FALLING, 0.0]))
-    kept = THROWN - MU * (FALLING + sim.GRAVITY * 15 * DT)
-    return float((path[-1, 0] - path[-2, 0]) / DT / kept)
+    speed = THROWN - MU * (FALLING + sim.GRAVITY * 15 * DT)
+    return float((path[-1, 0] - path[-2, 0]) / DT / speed)
 
 
 def _slip(u: float, drive: float, c: float, *, steps: int, dt: float = DT) -> np.ndarray:

@@ -159,20 +159,20 @@ BUCKLING_ROWS = (4, 8)
     {"lateral_buckling": {}}, expected=1.0, tolerance=0.03, smoke=False,
     reason="the clamp holds back warping over a width, 4 % of the length",
 )  # fmt: skip
-def critical_load(where: str = "end", slender: float = 0.04) -> float:
+def critical_load(load: str = "end", slender: float = 0.04) -> float:
     """Return the load at which a strip on edge buckles sideways, over the closed form.
 
     Args:
-        where: the load acts, "end" or "weight".
+        load: on the "end", or "weight".
         slender: width over length.
 
     The free edges lack half a hinge, an error of first order in the cell: two meshes are extrapolated.
     """
-    coarse, fine = (_ratio(rows, where, slender) for rows in BUCKLING_ROWS)
+    coarse, fine = (_ratio(rows, load, slender) for rows in BUCKLING_ROWS)
     return 2 * fine - coarse
 
 
-def _ratio(rows: int, where: str, slender: float) -> float:
+def _ratio(rows: int, load: str, slender: float) -> float:
     columns = round(rows * ROW / slender)
     h = 1 / (columns - 0.5)  # the clamp lies half-way between the two pinned columns
     width = rows * h * ROW
@@ -180,9 +180,9 @@ def _ratio(rows: int, where: str, slender: float) -> float:
     points -= [h / 2, width / 2]
     cloth = flat_cloth(points, faces, BUCKLING_MATERIAL, held=points[:, 0] < 0.51 * h)
     D = BUCKLING_STIFFNESS / 4
-    exact = CRITICAL[where] * width * D * np.sqrt((1 - NU**2) * 2 * (1 - NU))
+    exact = CRITICAL[load] * width * D * np.sqrt((1 - NU**2) * 2 * (1 - NU))
     forces = np.zeros((len(points), 3))
-    if where == "weight":
+    if load == "weight":
         forces[:, 1] = -exact * cloth.vertex_areas / width
     else:
         tip = np.flatnonzero(points[:, 0] > 1 - 1e-9)
@@ -232,17 +232,17 @@ ANNULUS_MATERIAL = sim.Material(
 
 
 @known_answer(
-    {"slit_annulus_inner": {"which": "inner"}, "slit_annulus_outer": {"which": "outer"}},
+    {"slit_annulus_inner": {"side": "inner"}, "slit_annulus_outer": {"side": "outer"}},
     unit="m", tolerance=0.08, smoke=False, long=True,
     reason="half of what 3 % of bending stiffness changes; the limit of three meshes is 0.04 m off",
 )  # fmt: skip
-def corner(which: str) -> tuple[float, float]:
+def corner(side: str) -> tuple[float, float]:
     """Return the lift of the free lip's corner, "inner" or "outer", on infinitely fine meshes, and of shells.
 
     Edges on the border have no hinge, an error of first order in the cell: two meshes are extrapolated.
     """
     coarse, fine = (lifted(rows, D) for rows in ANNULUS_ROWS)
-    place = ("inner", "outer").index(which)
+    place = ("inner", "outer").index(side)
     return float((2 * fine - coarse)[place]), SZE[place]
 
 

@@ -151,12 +151,12 @@ def scikit_fem() -> dict[str, float]:
     force = slope.assemble(basis, x=field)[order]
     matrix = hessian.assemble(basis, x=field).tocsr()[order][:, order]
     ours = sim.Potential([energies.StretchStVK(flat_cloth(points, faces))])
-    apart = ours.gradient(x).ravel() - force
-    changed = (ours.hessian(x) - matrix).power(2).sum() / matrix.power(2).sum()
+    gap = ours.gradient(x).ravel() - force
+    change = (ours.hessian(x) - matrix).power(2).sum() / matrix.power(2).sum()
     return {
         "membrane_energy_scikit_fem": abs(ours.value(x) / float(energy.assemble(basis, x=field)) - 1),
-        "membrane_gradient_scikit_fem": float(np.linalg.norm(apart) / np.linalg.norm(force)),
-        "membrane_hessian_scikit_fem": float(np.sqrt(changed)),
+        "membrane_gradient_scikit_fem": float(np.linalg.norm(gap) / np.linalg.norm(force)),
+        "membrane_hessian_scikit_fem": float(np.sqrt(change)),
     }
 
 

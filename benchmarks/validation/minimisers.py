@@ -47,8 +47,8 @@ def newton_order() -> float:
         )
         for k in range(1, 12)
     ]
-    near = [k for k in range(len(errors) - 1) if errors[k] < 1e-3 and errors[k + 1] > 1e-15]
-    return fitted_order([errors[k + 1] for k in near], [errors[k] for k in near])
+    steps = [k for k in range(len(errors) - 1) if errors[k] < 1e-3 and errors[k + 1] > 1e-15]
+    return fitted_order([errors[k + 1] for k in steps], [errors[k] for k in steps])
 
 
 @known_answer(expected=0.0, tolerance=1e-12, reason="round-off of the energy")
@@ -141,8 +141,8 @@ def _patch(cells: int) -> sim.Cloth:
     return flat_cloth(*jittered_patch(cells), size=0.3)
 
 
-def _potential(cloth: sim.Cloth, *further: energies.Energy) -> sim.Potential:
-    return sim.Potential([energies.StretchStVK(cloth), energies.BendHinge(cloth), *further])
+def _potential(cloth: sim.Cloth, *extras: energies.Energy) -> sim.Potential:
+    return sim.Potential([energies.StretchStVK(cloth), energies.BendHinge(cloth), *extras])
 
 
 def _stretched() -> tuple[sim.Potential, np.ndarray]:

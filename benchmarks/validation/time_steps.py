@@ -101,5 +101,5 @@ def numerical_damping(frequency: float) -> tuple[float, float]:
         - HEIGHT
     )
     velocity = np.diff(path)[-1] / fitted_dt
-    left = np.hypot(path[-1], velocity / natural) / amplitude
-    return float(left), float((1 + (frequency * dt) ** 2) ** -15)
+    share = np.hypot(path[-1], velocity / natural) / amplitude
+    return float(share), float((1 + (frequency * dt) ** 2) ** -15)

@@ -232,8 +232,8 @@ def _block(u, a, b, blocks):
     """Write the blocks of corners a, b of the hinges of u, as _hessian lays it out, into blocks."""
     L, ra, rb = LANES_FLOAT64, SIGNS[a], SIGNS[b]
     # Only loops over rows that the compiler knows become vector instructions.
-    for row, of in ((39, 20 + a), (40, 20 + b), (41, 24 + a), (42, 24 + b)):
-        copy_lanes(u, of, u, row)
+    for row, source in ((39, 20 + a), (40, 20 + b), (41, 24 + a), (42, 24 + b)):
+        copy_lanes(u, source, u, row)
     for i in range(3):
         copy_lanes(u, 3 * b + i, u, 43 + i)
     for n in range(L):

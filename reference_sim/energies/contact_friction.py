@@ -103,8 +103,8 @@ class ContactFriction(Energy):
         slip = slip - (slip * normals).sum(-1, keepdim=True) * normals
         square, h = (slip**2).sum(-1), self.threshold
         y = torch.sqrt(torch.where(square > 0, square, torch.ones_like(square)))
-        near = square / h - torch.where(square > 0, y**3, torch.zeros_like(y)) / (3 * h * h) + h / 3
-        return torch.as_tensor(self._known_forces()).to(u) * torch.where(square < h * h, near, y)
+        cubic = square / h - torch.where(square > 0, y**3, torch.zeros_like(y)) / (3 * h * h) + h / 3
+        return torch.as_tensor(self._known_forces()).to(u) * torch.where(square < h * h, cubic, y)
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""

@@ -73,10 +73,10 @@ def _depths(x, order, vertices, constants, points, normals, margin, state):
 @njit(cache=True, inline="always", fastmath=FAST, error_model="numpy")
 def _longest(u):
     """Return a bound on the longest of the displacements u (3V,) [m], rounding included."""
-    most = np.float32(0.0)
+    square = np.float32(0.0)
     for i in range(0, len(u) - 2, 3):
-        most = max(most, u[i] * u[i] + u[i + 1] * u[i + 1] + u[i + 2] * u[i + 2])
-    return np.float32(1.00001) * np.sqrt(most) + np.float32(1e-7)
+        square = max(square, u[i] * u[i] + u[i + 1] * u[i + 1] + u[i + 2] * u[i + 2])
+    return np.float32(1.00001) * np.sqrt(square) + np.float32(1e-7)
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")

@@ -40,12 +40,12 @@ DERIVATIVES = (
 )  # fmt: skip
 
 
-def demand_positive(what: str, *, or_zero: bool = False, **numbers: float) -> None:
-    """Raise ValueError unless all numbers are finite and above 0; `what` names the term in the message."""
+def demand_positive(term: str, *, or_zero: bool = False, **numbers: float) -> None:
+    """Raise ValueError unless all numbers of the term so named are finite and above 0."""
     for name, value in numbers.items():
         if not (np.isfinite(value) and (value > 0 or (or_zero and value == 0))):
-            least = "at least 0" if or_zero else "above 0"
-            raise ValueError(f"{what} {name} = {value!r}: must be a finite number {least}")
+            bound = "at least 0" if or_zero else "above 0"
+            raise ValueError(f"{term} {name} = {value!r}: must be a finite number {bound}")
 
 
 class Energy:

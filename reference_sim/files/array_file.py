@@ -125,26 +125,26 @@ def read_pickled_arrays(path: str | Path, names: Collection[str]) -> dict[str, n
     try:
         with regular(path).open("rb") as stream:
             if (start := stream.read(1 << 16)).startswith(COMPRESSED) or JOBLIB in start:
-                how = "was written by joblib" if JOBLIB in start else "is compressed"
-                raise ValueError(f"{how}: load it by joblib.load and write its arrays by numpy.savez")
+                fault = "was written by joblib" if JOBLIB in start else "is compressed"
+                raise ValueError(f"{fault}: load it by joblib.load and write its arrays by numpy.savez")
             stream.seek(0)
             # The unpickler makes a table as long as the largest place that an object is put in.
             size = path.stat().st_size
             if any((at or 0) > size for op, at, _ in genops(stream) if op.name.endswith("PUT")):
                 raise ValueError("puts an object in a place beyond its end")
             stream.seek(0)
-            held = _Unpickler(stream, encoding="latin1").load()  # of text of Python 2
-        if type(held) is not dict:
+            data = _Unpickler(stream, encoding="latin1").load()  # of text of Python 2
+        if type(data) is not dict:
             raise ValueError("holds no dict of arrays")
         for name in names:
-            value = held.get(name)
+            value = data.get(name)
             if type(value) is _Stand:
                 value = value.array()
             if isinstance(value, np.ndarray | np.generic | int | float | list | tuple):
                 arrays[name] = _plain(np.asarray(value))
         name = ""
         if not arrays:
-            raise ValueError(f"none of its entries is known ({', '.join(map(str, list(held)[:12]))})")
+            raise ValueError(f"none of its entries is known ({', '.join(map(str, list(data)[:12]))})")
         return arrays
     # A broken pickle can fail in nearly every way, and none of them is this program's own.
     except Exception as error:

@@ -83,13 +83,13 @@ def _surface(
     return Surface(positions, faces, np.where(places[..., None] < 0, np.nan, uv[places]))
 
 
-def _triangles(path: Path, polygons: Sequence[Any], known: range, what: str) -> np.ndarray:
-    """Cut quads into triangles (F, 3). Raises MeshError for one that names what is not known."""
+def _triangles(path: Path, polygons: Sequence[Any], indices: range, noun: str) -> np.ndarray:
+    """Cut quads into triangles (F, 3). Raises MeshError for one that names none of the indices."""
     halves = [half for p in polygons for half in ((p[0], p[1], p[2]), (p[0], p[2], p[-1]))[: len(p) - 2]]
     triangles = np.array(halves, np.int64).reshape(-1, 3)
-    bad = np.flatnonzero(((triangles < known.start) | (triangles >= known.stop)).any(axis=1))
+    bad = np.flatnonzero(((triangles < indices.start) | (triangles >= indices.stop)).any(axis=1))
     if bad.size:
-        raise MeshError(f"{path}: triangle {bad[0]} names a {what} beyond the {known.stop} there are")
+        raise MeshError(f"{path}: triangle {bad[0]} names a {noun} beyond the {indices.stop} there are")
     return triangles
 
 
@@ -141,22 +141,22 @@ def _in_order(paths: list[Path]) -> list[Path]:
     Raises MeshError where they differ in something else, or where a number is missing or there twice.
     """
     parts = {path: re.split(r"([0-9]+)", str(path)) for path in paths}
-    varying = [k for k, words in enumerate(zip(*parts.values())) if len(set(words)) > 1]
-    alike = len({len(words) for words in parts.values()}) == 1
-    if len(paths) > 1 and not (alike and len(varying) == 1 and varying[0] % 2):
+    varying = [k for k, tokens in enumerate(zip(*parts.values())) if len(set(tokens)) > 1]
+    lengths = {len(tokens) for tokens in parts.values()}
+    if len(paths) > 1 and not (len(lengths) == 1 and len(varying) == 1 and varying[0] % 2):
         first, last = min(paths), max(paths)
         raise MeshError(
             f"{first}: differs from {last.name} in more than a number: name the frames of a sequence "
             "alike but for their numbers, and leave other meshes out of the folder"
         )
-    number = {path: int(words[varying[0]]) if varying else 0 for path, words in parts.items()}
+    number = {path: int(tokens[varying[0]]) if varying else 0 for path, tokens in parts.items()}
     frames = sorted(paths, key=number.__getitem__)
-    steps = [number[after] - number[path] for path, after in pairwise(frames)]
+    steps = [end - start for start, end in pairwise(map(number.__getitem__, frames))]
     usual = mode(steps) if steps else 0
-    for path, after, step in zip(frames, frames[1:], steps):
+    for path, follower, step in zip(frames, frames[1:], steps):
         if step != usual:
             raise MeshError(
-                f"{after}: its number is {step} above that of {path.name}, and others follow by {usual}: "
+                f"{follower}: its number is {step} above that of {path.name}, and others follow by {usual}: "
                 "add the frames that are missing, or number the files evenly"
             )
     return frames
@@ -213,12 +213,12 @@ def join_seams(surface: Surface, distance: float = JOIN_DISTANCE) -> tuple[Surfa
         return surface, np.arange(count)
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     of_vertex = connected_components(graph, directed=False)[1]
-    _, first = np.unique(of_vertex, return_index=True)
-    kept = np.sort(first)
+    _, firsts = np.unique(of_vertex, return_index=True)
+    ids = np.sort(firsts)
     place = np.empty(count, dtype=np.int64)
-    place[of_vertex[kept]] = np.arange(len(kept))
-    joined = replace(surface, positions=surface.positions[kept], faces=place[of_vertex][surface.faces])
-    return joined, kept
+    place[of_vertex[ids]] = np.arange(len(ids))
+    joined = replace(surface, positions=surface.positions[ids], faces=place[of_vertex][surface.faces])
+    return joined, ids
 
 
 def rest_chart(surface: Surface, scale: float) -> np.ndarray:

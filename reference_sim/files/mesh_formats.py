@@ -124,11 +124,11 @@ def _read_stl(path: Path) -> Contents:
     elif not data.lstrip().startswith(b"solid"):
         raise ValueError(f"is no whole STL ({count} triangles stated)")
     else:
-        words = re.findall(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", data)
-        corners = np.array([list(map(float, point)) for point in words]).reshape(-1, 3)
-    _, first, places = np.unique(corners, axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(first)  # of their first use
-    return corners[first[order]], list(np.argsort(order)[places].reshape(-1, 3)), (), ()
+        points = re.findall(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", data)
+        corners = np.array([list(map(float, point)) for point in points]).reshape(-1, 3)
+    _, firsts, places = np.unique(corners, axis=0, return_index=True, return_inverse=True)
+    order = np.argsort(firsts)
+    return corners[firsts[order]], list(np.argsort(order)[places].reshape(-1, 3)), (), ()
 
 
 def _read_ply(path: Path) -> Contents:
@@ -163,8 +163,8 @@ def _read_ply(path: Path) -> Contents:
     vertex: dict[str, Any]
     face: dict[str, Any]
     vertex, face = (
-        {name: values for name, values in contents.get(of, {}).items() if isinstance(values, kind)}
-        for of, kind in (("vertex", np.ndarray), ("face", list))
+        {name: values for name, values in contents.get(key, {}).items() if isinstance(values, kind)}
+        for key, kind in (("vertex", np.ndarray), ("face", list))
     )
     points = np.stack([vertex[axis] for axis in "xyz"], axis=1)
     polygons: Any = face.get("vertex_indices", face.get("vertex_index", ()))

@@ -69,10 +69,10 @@ def search(some, points, samples, exact, mesh, pose, faces, barycentric, closest
     x, x32 = np.empty((LANES, 3)), np.empty((3, LANES), np.float32)
     best, scale, useful = np.empty(LANES), np.empty(LANES), np.empty(LANES, np.float32)
     answer, weights = np.empty(LANES, np.int64), np.empty((LANES, 2))
-    apart, hits = np.empty(LANES, np.float32), np.empty(LANES, np.int64)
+    gaps, hits = np.empty(LANES, np.float32), np.empty(LANES, np.int64)
     out = np.empty(LANES * LANES, np.float32)
     leaves, bounds = np.empty(LANES * len(boxes), np.int64), np.empty(LANES * len(boxes), np.float32)
-    limited, missing = limit < np.inf, 0
+    limited, misses = limit < np.inf, 0
     for first in range(0, len(some), LANES):
         count, worst = min(LANES, len(some) - first), np.float32(0.0)
         for g in range(LANES):  # an incomplete group is filled up with its first member
@@ -96,7 +96,7 @@ def search(some, points, samples, exact, mesh, pose, faces, barycentric, closest
             worst = max(worst, useful[g])
         number = min(first // LANES, len(starts) - 1)
         near_count, nearest = _near_leaves(
-            starts[number], stops[number], blocks, masks, boxes, x32, worst, apart, leaves, bounds
+            starts[number], stops[number], blocks, masks, boxes, x32, worst, gaps, leaves, bounds
         )
         if near_count > 0:  # the nearest first
             leaves[0], leaves[nearest] = leaves[nearest], leaves[0]
@@ -107,7 +107,7 @@ def search(some, points, samples, exact, mesh, pose, faces, barycentric, closest
             leaf, changed = leaves[n], False
             if fitted[leaf] != pose.number:
                 fit_leaf(leaf, mesh, pose)
-            for i in range(leaf_bounds(leaf, boxes, slabs, lanes, x32, useful, count, apart, hits, out)):
+            for i in range(leaf_bounds(leaf, boxes, slabs, lanes, x32, useful, count, gaps, hits, out)):
                 g, within = hits[i] & (LANES - 1), hits[i] // LANES
                 at = first + g
                 while within:
@@ -135,8 +135,8 @@ def search(some, points, samples, exact, mesh, pose, faces, barycentric, closest
         for g in range(count):
             s, k = some[first + g], answer[g]
             if k < 0:
-                missed[missing] = s
-                missing += 1
+                missed[misses] = s
+                misses += 1
                 continue
             v, w = weights[g, 0], weights[g, 1]
             u = max(1.0 - v - w, 0.0)
@@ -145,7 +145,7 @@ def search(some, points, samples, exact, mesh, pose, faces, barycentric, closest
             barycentric[s, ascending[k, 1]], barycentric[s, ascending[k, 2]] = v, w
             for c in range(3):
                 closest[s, c] = u * corners[k, 0, c] + v * corners[k, 1, c] + w * corners[k, 2, c]
-    return missing
+    return misses
 
 
 @njit(cache=True, error_model="numpy")
@@ -168,7 +168,7 @@ def _useful(squared, scale, exact):
 
 
 @njit(cache=True, fastmath=BOUND_MATH)
-def _near_leaves(start, stop, blocks, masks, boxes, x32, worst, apart, leaves, bounds):
+def _near_leaves(start, stop, blocks, masks, boxes, x32, worst, gaps, leaves, bounds):
     """Write the listed leaves whose boxes are within `worst` [m^2] of the box of a group, and their bounds.
 
     Returns how many there are, and which of them is nearest.
@@ -185,12 +185,12 @@ def _near_leaves(start, stop, blocks, masks, boxes, x32, worst, apart, leaves, b
             dx = max(max(boxes[block, 0, lane] - h0, l0 - boxes[block, 3, lane]), zero)
             dy = max(max(boxes[block, 1, lane] - h1, l1 - boxes[block, 4, lane]), zero)
             dz = max(max(boxes[block, 2, lane] - h2, l2 - boxes[block, 5, lane]), zero)
-            apart[lane] = dx * dx + dy * dy + dz * dz
-        near = bits_at_most(apart, 0, worst) & mask
-        while near:
-            lane = lowest_bit(near)
-            near &= near - 1
-            leaves[near_count], bounds[near_count] = LANES * block + lane, apart[lane]
+            gaps[lane] = dx * dx + dy * dy + dz * dz
+        bits = bits_at_most(gaps, 0, worst) & mask
+        while bits:
+            lane = lowest_bit(bits)
+            bits &= bits - 1
+            leaves[near_count], bounds[near_count] = LANES * block + lane, gaps[lane]
             if bounds[near_count] < bounds[nearest]:
                 nearest = near_count
             near_count += 1
@@ -301,9 +301,9 @@ class FaceSearch:
 def _each_once(vertices: np.ndarray) -> np.ndarray:
     """Return the different numbers of each row (L, n), filled up with the least to the longest of them."""
     rows = np.sort(vertices, axis=1)
-    again = rows[:, 1:] == rows[:, :-1]
-    rows[:, 1:][again] = np.broadcast_to(rows[:, :1], again.shape)[again]
-    return np.ascontiguousarray(np.sort(rows, axis=1)[:, again.sum(axis=1).min() :])
+    copies = rows[:, 1:] == rows[:, :-1]
+    rows[:, 1:][copies] = np.broadcast_to(rows[:, :1], copies.shape)[copies]
+    return np.ascontiguousarray(np.sort(rows, axis=1)[:, copies.sum(axis=1).min() :])
 
 
 def _boxes(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -136,7 +136,7 @@ def _set_slab(offsets, slab):
 
 
 @njit(cache=True, fastmath=BOUND_MATH)
-def leaf_bounds(leaf, boxes, slabs, lanes, x32, useful, count, apart, hits, out):
+def leaf_bounds(leaf, boxes, slabs, lanes, x32, useful, count, excess, hits, out):
     """Write into out (LANES LANES,) the bounds of the faces of a leaf, for members that may need one.
 
     Box and slab of the leaf keep most away. Returns of how many members some faces are within what is of
@@ -153,8 +153,8 @@ def leaf_bounds(leaf, boxes, slabs, lanes, x32, useful, count, apart, hits, out)
         dz = max(max(l2 - x32[2, g], x32[2, g] - h2), zero)
         height = n0 * x32[0, g] + n1 * x32[1, g] + n2 * x32[2, g]
         dn = max(max(low - height, height - high), zero)
-        apart[g] = max(dx * dx + dy * dy + dz * dz, dn * dn) - useful[g]
-    needed = bits_at_most(apart, 0, zero) & ((1 << count) - 1)
+        excess[g] = max(dx * dx + dy * dy + dz * dz, dn * dn) - useful[g]
+    needed = bits_at_most(excess, 0, zero) & ((1 << count) - 1)
     while needed:
         g = lowest_bit(needed)
         needed &= needed - 1

@@ -49,13 +49,13 @@ def normals_of_corners(some, positions, faces, starts, around):
 
     starts, around: see `faces_around`.
     """
-    normals, known = np.empty_like(positions), np.zeros(len(positions), np.bool_)
+    normals, is_set = np.empty_like(positions), np.zeros(len(positions), np.bool_)
     for s in some:
         for a in range(3):
             v = faces[s, a]
-            if known[v]:
+            if is_set[v]:
                 continue
-            known[v] = True
+            is_set[v] = True
             x, y, z = 0.0, 0.0, 0.0
             for place in range(starts[v], starts[v + 1]):
                 f = around[place]
@@ -121,13 +121,13 @@ def plane_normals(points, closest, closest_faces, barycentric, vertices, faces, 
         )
         cosine, o0, o1, o2 = x * m0 + y * m1 + z * m2, x, y, z
         # Within a micrometre, or looking along the surface, the offset has no direction to trust.
-        beside = not (length > 1e-6 and np.abs(cosine) > 0.3)
+        untrusted = not (length > 1e-6 and np.abs(cosine) > 0.3)
         if cosine < -0.3 and min(u, v, w) <= ON_SIDE:
             face = faces[closest_faces[s]]
-            beside |= _beyond(
+            untrusted |= _beyond(
                 (x, y, z), closest[s], face, barycentric[s], vertices, faces, starts, around
             )
-        if beside:
+        if untrusted:
             ball, outwards = max(TANGENT_BALL, 1.5 * length), 1.0  # below c is in it, however deep
             x, y, z, _ = _unit(ball * m0 + length * x, ball * m1 + length * y, ball * m2 + length * z)
         else:
@@ -159,22 +159,22 @@ def _frame_of_face(x, i, j, k, axes):
 
 
 @njit(cache=True, error_model="numpy")
-def carry(points, closest, closest_faces, barycentric, before, after, faces, carried):
-    """Write into carried (N, 3) the points beside their closest faces, which go from `before` to `after`."""
-    old, new = np.empty((3, 3)), np.empty((3, 3))
+def carry(points, closest, closest_faces, barycentric, start, end, faces, carried):
+    """Write into carried (N, 3) the points beside their closest faces, which go from `start` to `end`."""
+    source, target = np.empty((3, 3)), np.empty((3, 3))
     for s in range(len(points)):
         i, j, k = faces[closest_faces[s], 0], faces[closest_faces[s], 1], faces[closest_faces[s], 2]
-        _frame_of_face(before, i, j, k, old)
-        _frame_of_face(after, i, j, k, new)
+        _frame_of_face(start, i, j, k, source)
+        _frame_of_face(end, i, j, k, target)
         u, v, w = barycentric[s, 0], barycentric[s, 1], barycentric[s, 2]
         for c in range(3):
-            carried[s, c] = u * after[i, c] + v * after[j, c] + w * after[k, c]
+            carried[s, c] = u * end[i, c] + v * end[j, c] + w * end[k, c]
         for a in range(3):
             local = 0.0
             for c in range(3):
-                local += old[a, c] * (points[s, c] - closest[s, c])
+                local += source[a, c] * (points[s, c] - closest[s, c])
             for c in range(3):
-                carried[s, c] += new[a, c] * local
+                carried[s, c] += target[a, c] * local
 
 
 def winding_numbers(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -186,17 +186,17 @@ def winding_numbers(vertices: np.ndarray, faces: np.ndarray, points: np.ndarray)
     """
     numbers = np.zeros(len(points), np.int64)
     low, high = vertices.min(axis=0), vertices.max(axis=0)
-    inside = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
-    if len(inside) == 0:
+    rows = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
+    if len(rows) == 0:
         return numbers
     along = int(np.argmin(high - low))
     axes = [(along + 1) % 3, (along + 2) % 3, along]  # the ray runs along the last
-    x, rays = np.ascontiguousarray(vertices[:, axes]), np.ascontiguousarray(points[inside][:, axes])
+    x, rays = np.ascontiguousarray(vertices[:, axes]), np.ascontiguousarray(points[rows][:, axes])
     sides = np.maximum((high - low)[axes[:2]], np.finfo(float).tiny)
     # As many as faces.
     cells = np.maximum(np.sqrt(len(faces) * sides / sides[::-1]), 1.0).astype(np.int64)
-    starts, met = _faces_of_cells(x, faces, low[axes], cells / sides, cells)
-    numbers[inside] = _crossings(x, faces, rays, low[axes], cells / sides, cells, starts, met)
+    starts, hits = _faces_of_cells(x, faces, low[axes], cells / sides, cells)
+    numbers[rows] = _crossings(x, faces, rays, low[axes], cells / sides, cells, starts, hits)
     return numbers
 
 
@@ -220,13 +220,13 @@ def _faces_of_cells(x, faces, low, scale, cells):
                 starts[u * cells[1] + v + 1] += 1
     for cell in range(len(starts) - 1):
         starts[cell + 1] += starts[cell]
-    met, filled = np.empty(starts[-1], np.int64), starts[:-1].copy()
+    hits, filled = np.empty(starts[-1], np.int64), starts[:-1].copy()
     for f in range(len(faces)):
         for u in range(box[f, 0], box[f, 2] + 1):
             for v in range(box[f, 1], box[f, 3] + 1):
-                met[filled[u * cells[1] + v]] = f
+                hits[filled[u * cells[1] + v]] = f
                 filled[u * cells[1] + v] += 1
-    return starts, met
+    return starts, hits
 
 
 @njit(cache=True, error_model="numpy")
@@ -244,14 +244,14 @@ def _area(x, i, j, u, v):
 
 
 @njit(cache=True, error_model="numpy")
-def _crossings(x, faces, rays, low, scale, cells, starts, met):
+def _crossings(x, faces, rays, low, scale, cells, starts, hits):
     """Return the signed crossings (P,) of the rays from points, in the direction of the last axis."""
     numbers = np.zeros(len(rays), np.int64)
     for p in range(len(rays)):
         u, v, height = rays[p, 0], rays[p, 1], rays[p, 2]
         cell = _cell(u, low[0], scale[0], cells[0]) * cells[1] + _cell(v, low[1], scale[1], cells[1])
         for place in range(starts[cell], starts[cell + 1]):
-            face = faces[met[place]]
+            face = faces[hits[place]]
             i, j, k = face[0], face[1], face[2]
             if max(x[i, 2], x[j, 2], x[k, 2]) < height:
                 continue

@@ -25,19 +25,19 @@ def boundary_loops(faces: Index) -> list[Index]:
     size = int(faces.max()) + 1
     forward, backward = halves @ [size, 1], halves @ [1, size]
     rim = halves[~np.isin(forward, backward)]
-    following = dict(rim.tolist())
-    if len(following) != len(rim) or set(following) != set(following.values()):
+    heads = dict(rim.tolist())
+    if len(heads) != len(rim) or set(heads) != set(heads.values()):
         raise ValueError(
             "boundary loops touch or the winding is not consistent: the mesh is not manifold"
         )
     loops = []
-    while following:
-        vertex, after = next(iter(following.items()))
-        loop = [vertex]
-        del following[vertex]
-        while after != loop[0]:
-            loop.append(after)
-            after = following.pop(after)
+    while heads:
+        start, vertex = next(iter(heads.items()))
+        loop = [start]
+        del heads[start]
+        while vertex != start:
+            loop.append(vertex)
+            vertex = heads.pop(vertex)
         loops.append(np.array(loop, dtype=np.int64))
     return sorted(loops, key=lambda loop: (-len(loop), int(loop[0])))
 
@@ -75,12 +75,12 @@ def check_closed(positions: np.ndarray, faces: np.ndarray) -> None:
         frame, vertex, _ = np.argwhere(~np.isfinite(positions))[0]
         raise MeshError(f"obstacle vertex {vertex} of frame {frame} is not finite")
     try:
-        edges, beside, _ = edge_table(faces, positions.shape[1])
+        edges, sides, _ = edge_table(faces, positions.shape[1])
     except MeshError as error:
         raise MeshError(f"obstacle is not closed: {error}") from None
-    lone = np.flatnonzero((beside < 0).any(axis=1))
-    if len(lone):
-        edge, face = tuple(edges[lone[0]].tolist()), beside[lone[0]].max()
+    rim = np.flatnonzero((sides < 0).any(axis=1))
+    if len(rim):
+        edge, face = tuple(edges[rim[0]].tolist()), sides[rim[0]].max()
         one = f"edge {edge} of face {face} has one face only"
         raise MeshError(f"obstacle is not closed: {one}: fill the hole")
     for frame, x in enumerate(positions):

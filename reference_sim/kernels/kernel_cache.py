@@ -62,12 +62,12 @@ def njit(**options: Any) -> Callable[[Any], Any]:
             _folders[module] = _folder(function, _digests[module])
         folder = _folders[module] if options.get("cache") else None
         # While it decorates: kernels of other packages keep their own.
-        given = _config.CACHE_LOCATOR_CLASSES
+        locators = _config.CACHE_LOCATOR_CLASSES
         _config.CACHE_LOCATOR_CLASSES = f"{__name__}.{KernelLocator.__name__}"
         try:
             kernel = numba.njit(**(options | {"cache": folder is not None}))(function)
         finally:
-            _config.CACHE_LOCATOR_CLASSES = given
+            _config.CACHE_LOCATOR_CLASSES = locators
         if folder:
             kernel.compile = _alone(kernel.compile, folder / f"{function.__qualname__}.lock")
         return kernel
@@ -120,9 +120,9 @@ def _digest(function: Any) -> str:
 
 def _folder(function: Any, digest: str) -> Path | None:
     """Return the writable folder for a module's kernels of this digest; None if there can be none."""
-    beside = Path(function.__code__.co_filename).parent / "__pycache__"
-    given, of_user = _config.CACHE_DIR, AppDirs(appname="numba", appauthor=False).user_cache_dir
-    for base in [given] if given else [beside, of_user]:
+    pycache = Path(function.__code__.co_filename).parent / "__pycache__"
+    root, home = _config.CACHE_DIR, AppDirs(appname="numba", appauthor=False).user_cache_dir
+    for base in [root] if root else [pycache, home]:
         folder = Path(base, f"{function.__module__}-{digest}")
         with contextlib.suppress(OSError):
             folder.mkdir(parents=True, exist_ok=True)

@@ -140,18 +140,18 @@ def descend(
     value = evaluate(u, target, vertices, terms, gradient, scratch, energies)
     counts[0], counts[1] = 0.0, first_step
     trial_energies = np.empty_like(energies)
-    most, held, newest = len(memory.rho), 0, -1
-    alphas = np.empty(most, np.float32)
+    size, pairs, newest = len(memory.rho), 0, -1
+    alphas = np.empty(size, np.float32)
     while counts[0] < iterations and np.abs(gradient).max() > tolerance and np.isfinite(value):
         for i in range(len(u)):
             p[i] = -gradient[i]
-        for back in range(held):
-            k = (newest - back) % most
+        for back in range(pairs):
+            k = (newest - back) % size
             alphas[k] = memory.rho[k] * dot(memory.S[k], p)
             add_scaled(p, -alphas[k], memory.Y[k])
         apply_inverse(p, factor)
-        for back in range(held - 1, -1, -1):
-            k = (newest - back) % most
+        for back in range(pairs - 1, -1, -1):
+            k = (newest - back) % size
             add_scaled(p, alphas[k] - memory.rho[k] * dot(memory.Y[k], p), memory.S[k])
         slope, share, accepted, trial_value = dot(gradient, p), np.float32(1.0), False, value
         if counts[0] == 0:
@@ -167,9 +167,9 @@ def descend(
                 break
             share *= np.float32(0.5)
         if not accepted:
-            if held == 0:
+            if pairs == 0:
                 break
-            held = 0
+            pairs = 0
             continue
         if counts[0] == 0:
             counts[1] = share
@@ -179,7 +179,7 @@ def descend(
             gradient[i] = trial_gradient[i] - gradient[i]
         curvature = dot(p, gradient)
         if curvature > LEAST_CURVATURE * np.sqrt(dot(p, p) * dot(gradient, gradient)):
-            newest, held = (newest + 1) % most, min(held + 1, most)
+            newest, pairs = (newest + 1) % size, min(pairs + 1, size)
             copy(p, memory.S[newest])
             copy(gradient, memory.Y[newest])
             memory.rho[newest] = np.float32(1.0) / curvature
@@ -296,7 +296,7 @@ def _with_common(kernels: tuple[Float32Lanes, ...]) -> tuple[list[Float32Lanes],
     kinds = [lanes.gradient for lanes in kernels]
     if len(set(kinds)) < len(kinds):
         return list(kernels), list(range(len(kinds)))
-    common = {lanes.gradient: lanes for lanes in (of(NOTHING) for of in COMMON)}
+    common = {lanes.gradient: lanes for lanes in (make(NOTHING) for make in COMMON)}
     common |= dict(zip(kinds, kernels))
     return list(common.values()), [list(common).index(kind) for kind in kinds]
 

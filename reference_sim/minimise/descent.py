@@ -182,22 +182,22 @@ class Descent:
         step[self.free] = p.reshape(-1, 3)
         return step
 
-    def line_search(self, p: np.ndarray, slope: float, allowed: float | None = None) -> float:
+    def line_search(self, p: np.ndarray, slope: float, reach: float | None = None) -> float:
         """Halve the step along p (3n,) until the energy falls enough, and go there.
 
-        slope: of the energy along p [J]. allowed: share of p that no term forbids, where it is known
+        slope: of the energy along p [J]. reach: share of p that no term forbids, where it is known
         already.
         Returns the share of p that was taken, 0 if none would do.
         """
         step = self.spread(p)
-        alpha = self.potential.largest_step(self.x, step) if allowed is None else allowed
+        alpha = self.potential.largest_step(self.x, step) if reach is None else reach
         for _ in range(STEP_HALVINGS):
             trial = self.x + alpha * step
             value, gradient = self.evaluate(trial)
             if np.isfinite(value) and np.isfinite(gradient).all():
                 gain, end = alpha * slope, alpha * dot(gradient, p)
-                enough = sufficient_decrease(self.value, value, gain)
-                if enough or approximate_wolfe(self.value, value, gain, end):
+                falls = sufficient_decrease(self.value, value, gain)
+                if falls or approximate_wolfe(self.value, value, gain, end):
                     self.x, self.value, self.g = trial, value, gradient
                     return alpha
             alpha *= 0.5
@@ -252,18 +252,18 @@ def mean_weight(potential: Potential) -> float:
     return float(potential.cloth.masses.mean() * GRAVITY)
 
 
-def sufficient_decrease(before: float, after: float, slope: float) -> bool:
+def sufficient_decrease(start: float, end: float, slope: float) -> bool:
     """Return whether the energy [J] fell enough on a step whose linear prediction is `slope` (Armijo)."""
-    return after <= before + SUFFICIENT_DECREASE * slope
+    return end <= start + SUFFICIENT_DECREASE * slope
 
 
-def approximate_wolfe(before: float, after: float, slope: float, end_slope: float) -> bool:
+def approximate_wolfe(start: float, end: float, slope: float, end_slope: float) -> bool:
     """Return whether, within round-off of the energy, the slopes at both ends of a step say that it fell.
 
     Source: Hager and Zhang 2005, approximate Wolfe conditions.
     """
-    noise = 1e-13 * abs(before)
-    flat = after <= before + noise and -slope < 100 * noise
+    noise = 1e-13 * abs(start)
+    flat = end <= start + noise and -slope < 100 * noise
     return flat and float(end_slope) <= (2 * SUFFICIENT_DECREASE - 1) * slope
 
 

@@ -91,11 +91,11 @@ def convergence_check(run: NewtonRun, values: np.ndarray, round_off: float) -> S
     tolerance, step_tolerance = run.newton.tolerance, run.newton.step_tolerance
     residual = run.gradient_norm()
     relaxed = max(residual, round_off) > tolerance
-    why = "gradient within tolerance"
+    reason = "gradient within tolerance"
     if residual > tolerance:
-        why = f"round-off: residual {residual:.1e} above tolerance {tolerance:.1e}"
+        reason = f"round-off: residual {residual:.1e} above tolerance {tolerance:.1e}"
     elif relaxed:
-        why = (
+        reason = (
             f"round-off: up to {round_off:.1e} in the residual, {residual:.1e}, tolerance {tolerance:.1e}"
         )
     if run.factorise(values, run.hessian.tiny_shift(values)):
@@ -105,7 +105,7 @@ def convergence_check(run: NewtonRun, values: np.ndarray, round_off: float) -> S
             return None
         # Without curvature no step can be told from another.
         evidence = f"Newton step {step:.1e} m" if small else "a direction without curvature"
-        return Stop("converged", f"{why}, {evidence}", relaxed)
+        return Stop("converged", f"{reason}, {evidence}", relaxed)
     if escape_saddle(run, values, FIRST_ESCAPE * step_tolerance):
         run.iterations += 1
         return None

@@ -97,18 +97,18 @@ class LBFGS:
 
     def minimise(self, x0: np.ndarray) -> Result:
         """Minimise from x0 (V, 3) [m]; pinned vertices stay where x0 has them."""
-        refused: Descent | None = None
+        failure: Descent | None = None
         if self._newton is not None and self._compiled is not None:
-            first = Descent(self.potential, x0)
-            if self._in_float32(self._compiled, first):
-                return self._newton.minimise(first.x, after=first)
-            refused = first
+            trial = Descent(self.potential, x0)
+            if self._in_float32(self._compiled, trial):
+                return self._newton.minimise(trial.x, after=trial)
+            failure = trial
         run = LBFGSRun(self, x0)
-        if refused is not None:
-            run.started = refused.started
+        if failure is not None:
+            run.started = failure.started
         stop = iterate(self, run)
-        if refused is not None:
-            run.add_costs(refused)
+        if failure is not None:
+            run.add_costs(failure)
         if self._newton is None or stop.status in ("diverged", "timeout"):
             return run.result(stop)
         return self._newton.minimise(run.x, after=run)

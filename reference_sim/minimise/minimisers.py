@@ -158,9 +158,9 @@ class StepMinimiser:
         """
         potential, pins = self.potential, self.potential.cloth.pins
         motion, goal, progress = guess - x, guess, 0.0
-        reached, begun, late = [0.0], time.perf_counter(), False
+        history, begun, late = [0.0], time.perf_counter(), False
         rough: list[Result] = []
-        while len(reached) <= MAX_APPROACHES and not late:
+        while len(history) <= MAX_APPROACHES and not late:
             shares: list[float] = []
             for free_too in (True, False):
                 if not free_too:
@@ -179,9 +179,9 @@ class StepMinimiser:
             x = rough[-1].positions
             goal = x + (1 - progress) * motion
             goal[pins] = guess[pins]
-            reached.append(progress)
+            history.append(progress)
             late = time.perf_counter() - begun > self.options.get("timeout", float("inf"))
-            if progress - reached[max(len(reached) - 4, 0)] < LEAST_APPROACH and len(reached) > 3:
+            if progress - history[max(len(history) - 4, 0)] < LEAST_APPROACH and len(history) > 3:
                 break
         result = _after(*rough, self.minimise_from(x))
         if result.status == "diverged":

@@ -87,8 +87,8 @@ class Newton:
             result = run.result(iterate(self, run))
         finally:
             self.potential.forget()
-        wrong = self.potential.infeasibility(result.positions)
-        return replace(result, status="diverged", reason=wrong) if wrong else result
+        problem = self.potential.infeasibility(result.positions)
+        return replace(result, status="diverged", reason=problem) if problem else result
 
     def terminate(self, run: NewtonRun) -> Stop | None:
         """Let the true Hessian decide where the gradient is small; otherwise assemble the next step's."""
@@ -184,21 +184,21 @@ class NewtonRun(Descent):
         Returns whether there was a step.
         """
         start, value, g = self.x, self.value, self.g
-        first, predicted, first_allowed = projection, self.predicting, 1.0
+        level, predicted, first_reach = projection, self.predicting, 1.0
         p, projection = first_p, first_projection = self.direction(values, projection)
         slope = dot(g, p)
         # Every direction is an iteration, also one that is taken back: the loop counts the first.
         watchdog = self.iterations - self.quasi_newton_steps >= WATCHDOG_AFTER
-        most = (
+        limit = (
             min(self.watchdog_steps, self.newton.max_iterations - self.iterations - 1) if watchdog else 0
         )
-        for k in range(most + 1 if slope < 0 else 0):  # none if it is nan
+        for k in range(limit + 1 if slope < 0 else 0):  # none if it is nan
             step = self.spread(p)
             if not np.isfinite(p).all():
                 break
-            allowed = self.potential.largest_step(self.x, step)
-            first_allowed = allowed if k == 0 else first_allowed
-            if allowed < 1:
+            reach = self.potential.largest_step(self.x, step)
+            first_reach = reach if k == 0 else first_reach
+            if reach < 1:
                 break
             self.potential.predict_stress(self.x, step)
             self.x = self.x + step
@@ -210,10 +210,10 @@ class NewtonRun(Descent):
                 self.predicting = watchdog and (k > 0 or self.value - value > PREDICTED * 0.5 * slope)
                 if not self.predicting:
                     self.potential.forget()
-                self.projection_level, self.raised = projection, projection > first
+                self.projection_level, self.raised = projection, projection > level
                 self.watchdog_steps = WATCHDOG_STEPS
                 return True
-            if k == most or self.late(self.newton.timeout):
+            if k == limit or self.late(self.newton.timeout):
                 break
             p, projection = self.direction(self.assemble(CONVEXITY[projection]), projection)
             self.iterations += 1
@@ -221,8 +221,8 @@ class NewtonRun(Descent):
         self.predicting = False
         self.watchdog_steps = self.watchdog_steps // 2 if watchdog else WATCHDOG_STEPS
         self.x, self.value, self.g = start, value, g
-        self.projection_level, self.raised = first_projection, first_projection > first
-        return not predicted and slope < 0 and self.line_search(first_p, slope, first_allowed) > 0
+        self.projection_level, self.raised = first_projection, first_projection > level
+        return not predicted and slope < 0 and self.line_search(first_p, slope, first_reach) > 0
 
     def direction(self, values: np.ndarray, projection: int) -> tuple[np.ndarray, int]:
         """Return -H^-1 g (3n,) with the first projection, then shift, that makes H positive definite.

@@ -85,7 +85,7 @@ def _solvers(run: Run, members: list[Point]) -> Curve:
     if base := run.methods[members[0].method].base:
         look = family_style(run, run.methods[members[0].method])
         look = replace(look, label=f"{run.label(base)} + solver", line=":")
-    return Curve(best, look, [point for point in members if point not in best])
+    return Curve(best, look, [p for p in members if p not in best])
 
 
 def _family(run: Run, members: list[Point]) -> Curve:
@@ -93,7 +93,7 @@ def _family(run: Run, members: list[Point]) -> Curve:
     method = run.methods[members[0].method]
     if method.level is None:
         return Curve(members, style(run, method.name))
-    members.sort(key=lambda point: run.methods[point.method].level or 0.0)
+    members.sort(key=lambda p: run.methods[p.method].level or 0.0)
     levels = dict.fromkeys(
         power_text(run.methods[p.method].level or 0.0) for p in (members[0], members[-1])
     )
@@ -118,16 +118,16 @@ def draw_points(
         reference: run time of the reference [ms per frame], None where unknown.
         band: error below which differences are inconclusive.
     """
-    points = [point for curve in curves for point in (*curve.points, *curve.aside)]
-    least = _least(points, band)
-    best = front(p for p in points if p.error > least)
+    points = [p for curve in curves for p in (*curve.points, *curve.aside)]
+    floor = _floor(points, band)
+    best = front(p for p in points if p.error > floor)
     if len(best) > 1:
         axes.plot([p.time for p in best], [p.error for p in best], color=FRONT, linewidth=5.0, zorder=1)
     for curve in curves:
-        marks = [point for point in curve.points if point.error > least]
-        times, errors = [point.time for point in marks], [point.error for point in marks]
+        marks = [p for p in curve.points if p.error > floor]
+        times, errors = [p.time for p in marks], [p.error for p in marks]
         axes.plot(times, errors, color=curve.look.colour, linestyle=curve.look.line, linewidth=1.1)
-        for point in (*marks, *(point for point in curve.aside if point.error > least)):
+        for point in (*marks, *(p for p in curve.aside if p.error > floor)):
             colour = GREY if point.error < band else curve.look.colour
             pale = point in curve.aside
             _draw_marker(axes, point, style(run, point.method).marker, colour, pale=pale)
@@ -140,12 +140,12 @@ def draw_points(
     axes.set_ylim(low, high)
     if band > low:
         axes.axhspan(low, band, color=BAND, zorder=0)
-    return {point.method for point in points if point.error <= least}
+    return {p.method for p in points if p.error <= floor}
 
 
-def _least(points: Sequence[Point], band: float) -> float:
+def _floor(points: Sequence[Point], band: float) -> float:
     """Return the error below which none is drawn: what is within the reference's needs no decades."""
-    largest = max((point.error for point in points), default=0.0)
+    largest = max((p.error for p in points), default=0.0)
     return max(largest * 10.0**-DECADES, band / 10.0)
 
 
@@ -173,7 +173,7 @@ def error_of_page_one(run: Run) -> Drawing | None:
         for name in ERRORS:
             points = error_points(run, rows, name)
             band = indistinct(run, rows, name)
-            if sum(point.error > _least(points, band) for point in points) > 1:
+            if sum(p.error > _floor(points, band) for p in points) > 1:
                 return _draw_page_one(run, rows, run.metrics[name], points, band)
     return None
 
@@ -197,7 +197,7 @@ def _draw_page_one(
     fit(figure, entries, markers=True)
     scene = scene_in_words(rows["scene"].iloc[0])
     caption = f"{scene}: lower left is better. Pale line: the best at each time."
-    for solvers in (curve for curve in curves if curve.look is SOLVERS):
+    for solvers in (c for c in curves if c.look is SOLVERS):
         first, last = (run.label(solvers.points[end].method) for end in (0, -1))
         caption += f" {SOLVERS.label}: from {first} to {last}"
         caption += "; faint: solvers that another beats in both." if solvers.aside else "."

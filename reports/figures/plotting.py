@@ -75,19 +75,19 @@ def family_style(run: Run, method: ReportedMethod) -> Style:
     its own where it is a solver; an ablation has the marker of its base alone.
     """
     label = method.label if method.level is None else method.label.partition(",")[0]
-    if known := KNOWN.get(method.family):
-        return replace(known, label=known.label or label)
+    if preset := KNOWN.get(method.family):
+        return replace(preset, label=preset.label or label)
     number = zlib.crc32(method.family.encode())
     spare = Style(label, _SPARE[number % len(_SPARE)], _SPARE_MARKERS[number % len(_SPARE_MARKERS)])
     base = run.methods.get(method.base)
-    above = family_style(run, base) if base and base is not method else KNOWN.get(method.base)
-    if above is None:
+    look = family_style(run, base) if base and base is not method else KNOWN.get(method.base)
+    if look is None:
         return spare
     if method.role == "ablation":
-        return replace(spare, marker=above.marker, line=":")
+        return replace(spare, marker=look.marker, line=":")
     if method.role == "warm-started":
-        return replace(above, label=label, marker="X", line="-.")
-    return replace(above, label=label)
+        return replace(look, label=label, marker="X", line="-.")
+    return replace(look, label=label)
 
 
 def style(run: Run, method: str) -> Style:
@@ -165,15 +165,15 @@ def fit(figure: Canvas, entries: Sequence[Style], *, markers: bool = False) -> N
     figure.draw_without_rendering()
 
 
-def log_axis(axes: Axes, which: str) -> None:
+def log_axis(axes: Axes, name: str) -> None:
     """Make the x or y axis logarithmic with plain numbers: 0.01, 0.1, 1; and 2, 5 where it is short.
 
     Call it when the limits are set.
     """
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-    axis: XAxis | YAxis = axes.xaxis if which == "x" else axes.yaxis
-    axes.set(**{f"{which}scale": "log"})
+    axis: XAxis | YAxis = axes.xaxis if name == "x" else axes.yaxis
+    axes.set(**{f"{name}scale": "log"})
     low, high = axis.get_view_interval()
     decades = math.log10(high / low)
     axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if decades < 1.7 else (1.0,), numticks=7))

@@ -36,10 +36,10 @@ class Pack:
     entries: dict[str, dict[str, Any]] = field(default_factory=dict)
     parts: list[bytes] = field(default_factory=list)
 
-    def _add(self, name: str, array: np.ndarray, **how: Any) -> None:
+    def _add(self, name: str, array: np.ndarray, **fields: Any) -> None:
         start = sum(map(len, self.parts))
         self.parts.append(array.tobytes())
-        self.entries[name] = {"at": start, "shape": list(array.shape), **how}
+        self.entries[name] = {"at": start, "shape": list(array.shape), **fields}
 
     def positions(self, name: str, positions: np.ndarray) -> None:
         """Add finite positions (T,V,3) [m]: low bytes, then high ones, of differences from linear motion."""
@@ -203,8 +203,8 @@ def _cloth(
     curvature = curvature_series(cloth.positions, faces)
     pack.values("curvature", np.where(curvature.area > 0.0, curvature.curvature, 0.0))  # 0 on boundaries
     if reference is not None and _comparable(cloth, reference):
-        apart = cloth.positions - reference.positions[: cloth.frames]
-        pack.values("distance", MM * np.linalg.norm(apart, axis=-1))
+        offsets = cloth.positions - reference.positions[: cloth.frames]
+        pack.values("distance", MM * np.linalg.norm(offsets, axis=-1))
     if depths is not None:
         pack.values("depth", depths)
     if STEP in cloth.frame_fields:

@@ -105,8 +105,8 @@ class Effect:
         """Ends of the interval on the scale."""
         if self.error is None:
             return self.limits
-        reach, (least, greatest) = self._quantile * self.error, self.possible
-        return max(self.value - reach, least), min(self.value + reach, greatest)
+        reach, (low, high) = self._quantile * self.error, self.possible
+        return max(self.value - reach, low), min(self.value + reach, high)
 
     @property
     def margin(self) -> float:
@@ -217,24 +217,23 @@ def cost_effect(one: Mean, other: Mean, *, exact: bool = False) -> Effect:
     exact: see Effect.
     """
     scale = RATIO if _positive(one) and _positive(other) else DIFFERENCE
-    apart = [
-        float(on_scale(value, scale)) - float(on_scale(beside, scale))
-        for (scene, _), value in one.cells.items()
-        for (where, _), beside in other.cells.items()
-        if where == scene
+    gaps = [
+        float(on_scale(first, scale)) - float(on_scale(second, scale))
+        for (scene, _), first in one.cells.items()
+        for (place, _), second in other.cells.items()
+        if place == scene
     ]
-    far = effect(one, other, scale)
-    limits = (min(apart), max(apart)) if min(apart) < max(apart) else None
-    return replace(far, error=None, limits=limits, covers=RANGE, exact=exact)
+    limits = (min(gaps), max(gaps)) if min(gaps) < max(gaps) else None
+    return replace(effect(one, other, scale), error=None, limits=limits, covers=RANGE, exact=exact)
 
 
 def _positive(mean: Mean) -> bool:
     return all(value > 0.0 for value in mean.cells.values())
 
 
-def _one_seed(mean: Mean, beside: Mean) -> bool:
+def _one_seed(mean: Mean, other: Mean) -> bool:
     """Return whether the mean is of one seed and the other one does not show how seeds scatter."""
-    return mean.seeded and mean.seeds == 1 and not (beside.seeded and beside.seeds > 1)
+    return mean.seeded and mean.seeds == 1 and not (other.seeded and other.seeds > 1)
 
 
 def _changes(one: Mean, other: Mean, scale: str) -> dict[str, float]:
@@ -246,17 +245,17 @@ def _changes(one: Mean, other: Mean, scale: str) -> dict[str, float]:
     cells = [
         (cell, mean.moved.get(cell, {})) for mean in (one, other) if mean.moved for cell in mean.cells
     ]
-    every = {scene for (scene, _), _ in cells}
+    scenes = {scene for (scene, _), _ in cells}
     names = sorted({name for _, moved in cells for name in moved})
-    most: dict[str, set[str]] = {}
+    members: dict[str, set[str]] = {}
     for name in names:
-        whole = every - {scene for (scene, _), moved in cells if name not in moved}
-        if 2 * len(whole) > len(every):
-            most[name] = whole
-    shared = set.intersection(*most.values()) if most else set()
-    if 2 * len(shared) <= len(every):
+        subset = scenes - {scene for (scene, _), moved in cells if name not in moved}
+        if 2 * len(subset) > len(scenes):
+            members[name] = subset
+    shared = set.intersection(*members.values()) if members else set()
+    if 2 * len(shared) <= len(scenes):
         return {}
-    return {n: _moved_by(one, n, scale, shared) - _moved_by(other, n, scale, shared) for n in most}
+    return {n: _moved_by(one, n, scale, shared) - _moved_by(other, n, scale, shared) for n in members}
 
 
 def _unpaired(one: Mean, other: Mean, scale: str) -> float:
@@ -314,8 +313,8 @@ def _drawn_alike(one: Mean, other: Mean, first: np.ndarray, second: np.ndarray) 
     several = second if lone[0] else first
     if any(lone) and several.shape[1] > 1:  # s^2 / S of the one and s^2 of the other
         mean = several.mean(axis=1, keepdims=True)
-        apart = first.mean(axis=1, keepdims=True) - second.mean(axis=1, keepdims=True)
-        return [apart + math.sqrt(1.0 + several.shape[1]) * (several - mean)]
+        gap = first.mean(axis=1, keepdims=True) - second.mean(axis=1, keepdims=True)
+        return [gap + math.sqrt(1.0 + several.shape[1]) * (several - mean)]
     return [first, -second]
 
 
@@ -324,9 +323,9 @@ def _bootstrap(grids: Sequence[np.ndarray]) -> tuple[float, float]:
     motions = _weights(len(grids[0]), 0)
     seeds = [_weights(grid.shape[1], stream) for stream, grid in enumerate(grids, 1)]
     draws = sum(np.einsum("bs,bs->b", motions @ grid, drawn) for grid, drawn in zip(grids, seeds))
-    alone = [motions @ sum(grid.mean(axis=1) for grid in grids)]
-    alone += [drawn @ grid.mean(axis=0) for grid, drawn in zip(grids, seeds)]
-    parts = np.array([part.var() for part in alone])
+    marginals = [motions @ sum(grid.mean(axis=1) for grid in grids)]
+    marginals += [drawn @ grid.mean(axis=0) for grid, drawn in zip(grids, seeds)]
+    parts = np.array([part.var() for part in marginals])
     free = np.array([len(grids[0]), *(grid.shape[1] for grid in grids)]) - 1
     terms = parts[free > 0] ** 2 / free[free > 0]
     # Where only motion and seed together scatter, nothing tells: the fewest that any factor has.

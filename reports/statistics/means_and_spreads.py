@@ -27,7 +27,7 @@ from reports.finished_run import Run
 class Mean:
     """Mean of a metric, its spread over seeds, and the cells it was taken over.
 
-    seeds: how many have the metric. asked: number of cells that should have it, every seed in every
+    seeds: how many have the metric. full_count: number of cells that should have it, every seed in every
     scene in which any method has the metric; where fewer have, the mean is not `complete` and the table
     must say so. stalled: a solver left some frames of some cell unconverged. seeded: another seed would
     give another value. cells: value of each (scene, seed). pairing_group: means of one group are compared
@@ -39,7 +39,7 @@ class Mean:
     value: float
     spread: float | None
     seeds: int
-    asked: int
+    full_count: int
     stalled: bool = False
     seeded: bool = True
     cells: Mapping[tuple[str, int], float] = field(default_factory=dict, compare=False)
@@ -55,7 +55,7 @@ class Mean:
     @property
     def missing(self) -> int:
         """Number of cells without the metric: they failed, or belong to a network that diverged."""
-        return max(self.asked - len(self.cells), 0)
+        return max(self.full_count - len(self.cells), 0)
 
     @property
     def complete(self) -> bool:
@@ -65,7 +65,7 @@ class Mean:
     @property
     def fewer(self) -> str:
         """Remark behind a number on how many roll-outs it is over; empty where these are all."""
-        return "" if self.complete else f" ({len(self.cells)} of {self.asked} roll-outs)"
+        return "" if self.complete else f" ({len(self.cells)} of {self.full_count} roll-outs)"
 
 
 SEGMENT = re.compile(r"(?<=/)(\d+_\d+)_[a-z](?=@|$)")
@@ -108,19 +108,19 @@ def means(frame: pd.DataFrame, *keys: str) -> pd.Series:
     place, end = (
         itemgetter(*(names.index(key) for key in names if key != name)) for name in ("method", "metric")
     )
-    asked: dict[Any, set[str]] = defaultdict(set)
+    scenes: dict[Any, set[str]] = defaultdict(set)
     failed: dict[Any, set[int]] = defaultdict(set)
     groups: dict[tuple, list[Any]] = defaultdict(list)
     rows = frame.reindex(columns=READ)
     for key, line in zip(zip(*(frame[name].tolist() for name in names)), rows.itertuples(index=False)):
         if line.status == "skipped":
             continue
-        asked[place(key)].add(line.scene)
+        scenes[place(key)].add(line.scene)
         if line.usable:
             groups[key].append(line)
         else:
             failed[end(key)].add(line.seed)
-    values = [_mean(lines, len(asked[place(key)]), failed[end(key)]) for key, lines in groups.items()]
+    values = [_mean(lines, len(scenes[place(key)]), failed[end(key)]) for key, lines in groups.items()]
     index = pd.MultiIndex.from_arrays(
         [list(column) for column in zip(*groups)] or [[]] * len(names), names=names
     )
@@ -138,18 +138,17 @@ def _mean(lines: Sequence[Any], scenes: int, failed: Set[int]) -> Mean:
     # As statistics.stdev, which sums fractions: that took a third of the time of all means.
     middle = value if len(set(of_seeds)) > 1 else of_seeds[0]  # the mean of equal numbers may be rounded
     spread = math.dist(of_seeds, [middle] * len(of_seeds)) / math.sqrt(freedom) if freedom else None
-    known = (line for line in lines if not math.isnan(line.uncertainty))
-    unsure = {(line.scene, line.seed): line.uncertainty for line in known}
+    noise = {(x.scene, x.seed): x.uncertainty for x in lines if not math.isnan(x.uncertainty)}
     return Mean(
         value=value,
         spread=spread,
         seeds=len(of_seeds),
-        asked=scenes * len(by_seed.keys() | failed),
+        full_count=scenes * len(by_seed.keys() | failed),
         stalled=any(line.status == "stalled" for line in lines),
         seeded=any(line.seeded for line in lines),
         cells=cells,
         pairing_group=lines[0].pairing_group,
-        uncertainty=fmean(mean_by_recording(unsure).values()) if unsure else None,
+        uncertainty=fmean(mean_by_recording(noise).values()) if noise else None,
         moved={
             (line.scene, line.seed): dict(line.moved)
             for line in lines
@@ -195,8 +194,8 @@ def pair(frame: pd.DataFrame, one: str, other: str, metric: str) -> tuple[Mean |
         return first, second
     if not both:
         return None, None
-    asked = frame[(frame["metric"] == metric) & (frame["status"] != "skipped")]["scene"].nunique()
-    first, second = (replace(m, asked=asked * (m.asked // len(both))) for m in (first, second))
+    count = frame[(frame["metric"] == metric) & (frame["status"] != "skipped")]["scene"].nunique()
+    first, second = (replace(m, full_count=count * (m.full_count // len(both))) for m in (first, second))
     return first, second
 
 
@@ -263,11 +262,11 @@ def with_shares(
         return rows
     first, second = (frames[frames["method"] == name].dropna(subset=term) for name in (one, other))
     both = first.merge(second, on=FRAME, suffixes=("", "_other"))
-    above = {one: both[term] > both[f"{term}_other"], other: both[term] < both[f"{term}_other"]}
+    masks = {one: both[term] > both[f"{term}_other"], other: both[term] < both[f"{term}_other"]}
     parts = [rows]
-    for method, more in above.items():
+    for method, mask in masks.items():
         shares = (
-            (100.0 * more).groupby([both["scene"], both["seed"]]).mean().rename("share").reset_index()
+            (100.0 * mask).groupby([both["scene"], both["seed"]]).mean().rename("share").reset_index()
         )
         terms = rows[(rows["method"] == method) & (rows["metric"] == f"energy/{term}") & rows["usable"]]
         shared = terms.merge(shares, on=["scene", "seed"])

@@ -53,10 +53,10 @@ def counted(run: Run) -> dict[str, Counter[str]]:
     # What has any usable number has run, whatever became of the others.
     best_first = {"stalled": 0, "ok": 1}
     cells = cells.sort_values("status", key=lambda s: s.map(best_first).fillna(2), kind="stable")
-    judged = checks(run)
+    rows = checks(run)
     groups = {
         "cells": cells.drop_duplicates(["suite", "scene", "method", "seed"]),
-        "checks": judged[judged["tolerance"].notna() | (judged["status"] != "ok")],
+        "checks": rows[rows["tolerance"].notna() | (rows["status"] != "ok")],
         "stress tests": stress_tests(run),
     }
     return {kind: Counter(rows["status"]) for kind, rows in groups.items() if len(rows)}

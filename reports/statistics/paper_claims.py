@@ -148,8 +148,8 @@ EXPLORATORY = (
     *(Claim(REALISM, "distance/rms", "snug", f"snug-no-{term}") for term in (*TABLE_1, "collision")),
     Claim(COLLISION, "penetration/surface", "snug", "snug-no-collision"),
     *(
-        Claim(COSTS, f"cost/{what}", "snug", method)
-        for what in ("train", "frame", "memory")
+        Claim(COSTS, f"cost/{cost}", "snug", method)
+        for cost in ("train", "frame", "memory")
         for method in SUPERVISED
     ),
     *(Claim(SPEED_UP, BEFORE.name, "snug", method, factor=100.0) for method in SUPERVISED),
@@ -171,11 +171,11 @@ EXPLORATORY = (
     *(Claim(SAME, "curvature/change", "pbns-springs", method) for method in ("snug", "simulation")),
     *(Claim(LONGER, "energy/inertia", f"snug-window{length}", "snug", on_par=True) for length in (6, 12)),
     *(
-        Claim(DYNAMICS, f"dynamics/{of}", f"snug-{name}", "snug")
+        Claim(DYNAMICS, f"dynamics/{trait}", f"snug-{name}", "snug")
         for name in ("no-inertia", "window6", "window12")
-        for of in HEM
+        for trait in HEM
     ),
-    *(Claim(PAR, f"dynamics/{of}", "santesteban2019", "snug", on_par=True) for of in HEM),
+    *(Claim(PAR, f"dynamics/{trait}", "santesteban2019", "snug", on_par=True) for trait in HEM),
     *(
         Claim(STATES, metric, "snug-noise-alone", "snug-no-noise")
         for metric in ("energy/total", "roll_out/drift", "roll_out/last")
@@ -224,8 +224,8 @@ def judged(run: Run) -> list[Judged]:
     """Judge all claims whose two methods ran, primary ones first."""
     rows = run.garment_rows
     frame = with_before(rows[rows["garment"] == run.first_garment])
-    ran = set(frame["method"])
-    claims = [claim for claim in CLAIMS if {claim.lower, claim.higher} <= ran]
+    methods = set(frame["method"])
+    claims = [claim for claim in CLAIMS if {claim.lower, claim.higher} <= methods]
     compared = [_compared(run, frame, claim) for claim in claims]
     p_values = [
         comparison.effect.p_value(claim.factor) if comparison.effect else None
@@ -234,8 +234,8 @@ def judged(run: Run) -> list[Judged]:
     tested = [claim for claim in PRIMARY if claim.tested]
     tests = [k for k, claim in enumerate(claims) if claim in tested and p_values[k] is not None]
     corrected = holm([p for k in tests if (p := p_values[k]) is not None], family=len(tested))
-    for place, p in zip(tests, corrected):
-        p_values[place] = p
+    for k, p in zip(tests, corrected):
+        p_values[k] = p
     lines = []
     for claim, comparison, p in zip(claims, compared, p_values):
         if comparison.effect is not None and comparison.one is not None and comparison.other is not None:
@@ -258,32 +258,32 @@ def _compared(run: Run, frame: pd.DataFrame, claim: Claim) -> Comparison:
         one, other = pair(rows, claim.lower, claim.higher, metric.name)
         if one is None or other is None:
             return Comparison(metric, one, other, None)
-        far = effect(one, half_of(one), DIFFERENCE)
+        surplus = effect(one, half_of(one), DIFFERENCE)
         # Shares lie between 0 and 100 %: of motions that agree Student's t makes more than the sign test
         # can.
-        far = replace(far, possible=(-HALF, HALF), least_p=min(1.0, 2.0 * 0.5**far.motions))
-        if far.error is None and far.motions > 1:  # all or none of the frames in every motion
-            far = replace(far, error=0.0, covers="motions")
-        return Comparison(metric, one, other, far)
+        surplus = replace(surplus, possible=(-HALF, HALF), least_p=min(1.0, 2.0 * 0.5**surplus.motions))
+        if surplus.error is None and surplus.motions > 1:  # all or none of the frames in every motion
+            surplus = replace(surplus, error=0.0, covers="motions")
+        return Comparison(metric, one, other, surplus)
     unknown = Metric(name=claim.metric, unit="1", title=claim.metric, definition="")
     metric = BEFORE if claim.metric == BEFORE.name else run.metrics.get(claim.metric, unknown)
     return compare_methods(run, frame, metric, claim.lower, claim.higher)
 
 
-def verdict(claim: Claim, far: Effect, p: float | None) -> str:
+def verdict(claim: Claim, effect: Effect, p: float | None) -> str:
     """Return how the claim came out, by the p-value as the claim's family corrects it.
 
     A claim of parity holds where the upper end of the interval is within the margin of equality, also
     against simulations with smaller time steps.
     """
-    if claim.factor != 1.0 and far.scale != RATIO:
+    if claim.factor != 1.0 and effect.scale != RATIO:
         return OPEN  # no factor between numbers of which some are zero
-    if claim.on_par and not untested(far) and far.ends is not None:
-        worst = far.ends[1] + max((0.0, *far.against.values()))
-        if worst <= far.margin:
+    if claim.on_par and not untested(effect) and effect.ends is not None:
+        worst = effect.ends[1] + max((0.0, *effect.against.values()))
+        if worst <= effect.margin:
             return HOLDS
-    stands = standing(far, p, claim.factor)
-    return {LESS: HOLDS, MORE: FAILS}.get(stands, stands)
+    outcome = standing(effect, p, claim.factor)
+    return {LESS: HOLDS, MORE: FAILS}.get(outcome, outcome)
 
 
 def verdict_of_failed(claim: Claim, compared: Comparison, frame: pd.DataFrame) -> tuple[str, str]:
@@ -292,12 +292,12 @@ def verdict_of_failed(claim: Claim, compared: Comparison, frame: pd.DataFrame) -
     One whose roll-outs all diverged has more of an answer of which less is better, with as many motions
     and seeds as a test asks for. Its cost has no verdict: no time of it is usable.
     """
-    finished, name, which = compared.one, claim.higher, "second"
+    finished, name, side = compared.one, claim.higher, "second"
     if finished is None:
-        finished, name, which = compared.other, claim.lower, "first"
+        finished, name, side = compared.other, claim.lower, "first"
     failed = frame[(frame["method"] == name) & (frame["status"] != "skipped")]
     if finished and compared.metric.arbitrary_zero and (failed["metric"] == compared.metric.name).any():
-        return OPEN, f": the {which} fell off"
+        return OPEN, f": the {side} fell off"
     answer = compared.metric.lower_is_better and compared.metric.of == "answer"
     if not answer or finished is None or failed.empty or failed["usable"].any():
         return "", ""
@@ -305,12 +305,12 @@ def verdict_of_failed(claim: Claim, compared: Comparison, frame: pd.DataFrame) -
         map(recording_of, failed["scene"])
     )
     if set(failed["status"]) != {"diverged"}:
-        return OPEN, f": no roll-out of the {which} finished"
+        return OPEN, f": no roll-out of the {side} finished"
     if len(motions) < LEAST_MOTIONS:
-        return OPEN, f": the {which} diverged in fewer than {LEAST_MOTIONS} motions"
+        return OPEN, f": the {side} diverged in fewer than {LEAST_MOTIONS} motions"
     if failed["seeded"].any() and failed["seed"].nunique() == 1:
-        return OPEN, f": the {which} diverged with one seed"
-    return FAILS if which == "first" else HOLDS, f": the {which} diverged"
+        return OPEN, f": the {side} diverged with one seed"
+    return FAILS if side == "first" else HOLDS, f": the {side} diverged"
 
 
 def with_before(frame: pd.DataFrame) -> pd.DataFrame:

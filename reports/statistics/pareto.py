@@ -90,7 +90,7 @@ def front(points: Iterable[Point]) -> list[Point]:
 
 def fastest(points: Iterable[Point], error: float) -> Point | None:
     """Return the fastest point with at most that error, or None."""
-    reached = [point for point in points if point.error <= error]
+    reached = [p for p in points if p.error <= error]
     return min(reached, key=lambda p: (p.time, p.error, p.method)) if reached else None
 
 
@@ -123,12 +123,12 @@ def compared_cells(run: Run) -> tuple[pd.DataFrame, list[str]]:
     """
     cells = run.cells("speed", "garments")
     timed = cells[cells["usable"] & (cells["metric"] == TIME)]
-    apart = run.standing_apart(timed)
-    frame = cells[~cells["method"].isin(apart)]
-    ran = timed[~timed["method"].isin(apart)].groupby("scene")["method"].nunique()
+    ablations = run.standing_apart(timed)
+    frame = cells[~cells["method"].isin(ablations)]
+    counts = timed[~timed["method"].isin(ablations)].groupby("scene")["method"].nunique()
     first = next(iter(run.garments(frame).values()), [])
-    scenes = [scene for scene in dict.fromkeys(frame["scene"]) if scene in ran]
-    return frame, sorted(scenes, key=lambda scene: (scene not in first, -int(ran[scene])))
+    scenes = [scene for scene in dict.fromkeys(frame["scene"]) if scene in counts]
+    return frame, sorted(scenes, key=lambda scene: (scene not in first, -int(counts[scene])))
 
 
 def error_points(run: Run, rows: pd.DataFrame, metric: str) -> list[Point]:

@@ -72,12 +72,12 @@ def effect_of(metric: Metric, one: Mean, other: Mean) -> Effect:
     return effect(one, other, EXCESS if metric.arbitrary_zero else SIGNED.get(metric.name, ""))
 
 
-def standing(far: Effect, p: float | None, factor: float = 1.0) -> str:
+def standing(effect: Effect, p: float | None, factor: float = 1.0) -> str:
     """Return how `factor` times the first stands to the second: TIED, OPEN, LESS or MORE.
 
     Args:
-        far: the effect.
-        p: of far.p_value(factor), corrected where the comparison is one of a family; None for costs.
+        effect: the effect.
+        p: of effect.p_value(factor), corrected where the comparison is one of a family; None for costs.
         factor: see `Effect.p_value`.
 
     >>> standing(Effect(0.5, "ratio", error=0.1, freedom=10.0, motions=20), p=0.001)
@@ -85,44 +85,45 @@ def standing(far: Effect, p: float | None, factor: float = 1.0) -> str:
     >>> standing(Effect(0.5, "ratio", error=0.1, freedom=10.0, motions=3), p=0.001)
     'inconclusive'
     """
-    if untested(far):
+    if untested(effect):
         return OPEN
-    if far.covers == RANGE:
-        return _standing_of_range(far, factor)
-    if far.equal(factor):
+    if effect.covers == RANGE:
+        return _standing_of_range(effect, factor)
+    if effect.equal(factor):
         return TIED
-    if p is None or p >= LEVEL or abs(far.above(factor)) <= far.uncertainty or far.turned_by(factor):
+    gap = effect.above(factor)
+    if p is None or p >= LEVEL or abs(gap) <= effect.uncertainty or effect.turned_by(factor):
         return OPEN
-    return LESS if far.above(factor) < 0.0 else MORE
+    return LESS if gap < 0.0 else MORE
 
 
-def untested(far: Effect) -> str:
+def untested(effect: Effect) -> str:
     """Return why an effect has no verdict, as a remark behind it; empty where it has one.
 
     >>> untested(Effect(0.5, "ratio", error=0.1, freedom=10.0, motions=3))
     ': fewer than 4 motions'
     """
-    if far.covers == RANGE:
-        return "" if far.limits or far.exact else ": no range"
-    if far.one_seed:
+    if effect.covers == RANGE:
+        return "" if effect.limits or effect.exact else ": no range"
+    if effect.one_seed:
         return ": one seed"
-    return f": fewer than {LEAST_MOTIONS} motions" if far.motions < LEAST_MOTIONS else ""
+    return f": fewer than {LEAST_MOTIONS} motions" if effect.motions < LEAST_MOTIONS else ""
 
 
-def why_open(far: Effect, factor: float = 1.0) -> str:
+def why_open(effect: Effect, factor: float = 1.0) -> str:
     """Return why an effect is inconclusive, as a remark behind it: untested, or turned by smaller steps.
 
     >>> why_open(Effect(0.5, "ratio", error=0.1, motions=20, against={"simulation-dt/8": -0.6}))
     ': other sign against simulation-dt/8'
     """
-    p, turned = far.p_value(factor), ", ".join(far.turned_by(factor))
-    clear = p is not None and p < LEVEL and abs(far.above(factor)) > far.uncertainty
-    return untested(far) or (f": other sign against {turned}" if turned and clear else "")
+    p, turned = effect.p_value(factor), ", ".join(effect.turned_by(factor))
+    clear = p is not None and p < LEVEL and abs(effect.above(factor)) > effect.uncertainty
+    return untested(effect) or (f": other sign against {turned}" if turned and clear else "")
 
 
-def _standing_of_range(far: Effect, factor: float) -> str:
-    ends = [end + far.shift(factor) for end in far.limits or (far.value,)]
-    if all(abs(end) <= far.margin for end in ends):
+def _standing_of_range(effect: Effect, factor: float) -> str:
+    ends = [end + effect.shift(factor) for end in effect.limits or (effect.value,)]
+    if all(abs(end) <= effect.margin for end in ends):
         return TIED
     if max(ends) < 0.0:
         return LESS

@@ -121,12 +121,12 @@ def _by_time_step(run: Run, excesses: Mapping[tuple[str, str], Excess]) -> list[
 
 def _cells_of(excess: Excess) -> tuple[Cell, ...]:
     """Return the cells of a method in table relative_excess."""
-    worst, most = excess.worst
-    stands = standing(excess.effect, excess.effect.p_value())
-    stands += why_open(excess.effect) if stands == OPEN else ""
+    scene, value = excess.worst
+    verdict = standing(excess.effect, excess.effect.p_value())
+    verdict += why_open(excess.effect) if verdict == OPEN else ""
     return (
         excess.effect, excess.typical_of(recorded=True), excess.typical_of(recorded=False), excess.pooled,
-        most, scene_in_words(worst.partition("/")[2] or worst), len(excess.by_motion), stands,
+        value, scene_in_words(scene.partition("/")[2] or scene), len(excess.by_motion), verdict,
     )  # fmt: skip
 
 

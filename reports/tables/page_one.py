@@ -25,13 +25,11 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     over the scenes in which solvers were timed.
     """
     garment = run.first_garment
-    rows_of_garment = run.garment_rows[run.garment_rows["garment"] == garment]
-    timed, scenes = timed_rows(run, rows_of_garment)
-    rows_of_garment = timed if rows_of_garment.empty else rows_of_garment  # of a run of suite speed alone
-    plain = set(rows_of_garment[rows_of_garment["usable"]]["method"]) - run.standing_apart(
-        rows_of_garment
-    )
-    listed = leads(run, rows_of_garment)
+    garment_rows = run.garment_rows[run.garment_rows["garment"] == garment]
+    timed, scenes = timed_rows(run, garment_rows)
+    garment_rows = timed if garment_rows.empty else garment_rows  # of a run of suite speed alone
+    plain = set(garment_rows[garment_rows["usable"]]["method"]) - run.standing_apart(garment_rows)
+    listed = leads(run, garment_rows)
     others = [m for m in run.ordered(plain) if run.methods[m].role in ("network", EXTERNAL)]
     others += [m for m in run.ordered(plain) if run.methods[m].role == "baseline"]
     # Of a family of networks the last one: that of the highest level.
@@ -40,14 +38,14 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     best = rivals(run, timed) if scenes else []
     solvers = [m for m in best if m not in listed]
     listed = run.ordered(methods or [*listed[: ROWS - len(solvers)], *solvers])
-    queries = [(name, rows_of_garment) for name in ANSWERS] + [(GAP, timed), (run_time(timed), timed)]
-    queries += [("cost/train", rows_of_garment)]
+    queries = [(name, garment_rows) for name in ANSWERS] + [(GAP, timed), (run_time(timed), timed)]
+    queries += [("cost/train", garment_rows)]
     sources = [(run.metrics[name], rows) for name, rows in queries if name in run.metrics]
-    with_excess = with_relative_excess(run, rows_of_garment)
-    excess = {name: excess_of(run, with_excess, name) for name in listed if name != run.reference}
-    own_excess = {m: own_excess_of(run, rows_of_garment, m) for m in excess if m != SKINNING}
+    with_excess = with_relative_excess(run, garment_rows)
+    excesses = {name: excess_of(run, with_excess, name) for name in listed if name != run.reference}
+    own_excess = {m: own_excess_of(run, garment_rows, m) for m in excesses if m != SKINNING}
     shares: dict[str, tuple[Cell, Cell]] = {
-        name: (own_excess.get(name, of.effect), of.effect) for name, of in excess.items() if of
+        m: (own_excess.get(m, share.effect), share.effect) for m, share in excesses.items() if share
     }
     shares |= {run.reference: (0.0, 0.0)} if shares else {}
     lines: list[tuple[Cell, ...]] = [

@@ -39,13 +39,13 @@ def _by_garment(run: Run, name: str) -> list[Table]:
     sources = "timed motions" if name == "cost" else "sources of motion"
     metrics, lines = pivot(run, run.garment_rows, name, ("garment", "method"))
     twins = run.twins - (set(SECOND_STARTS[:1]) if name == "curvature" else set())
-    apart = {
+    omissions = {
         garment: run.standing_apart(rows) | twins
         for garment, rows in run.garment_rows[run.garment_rows["table"] == name].groupby("garment")
     }
     return table(
         name, (GARMENT, METHOD, *map(metric_column, metrics)),
-        [line for line in lines if line[1] not in apart[line[0]]],
+        [line for line in lines if line[1] not in omissions[line[0]]],
         f"{title}: means over {sources} and seeds.", grouped_by=("garment",),
         note=PAPER_COSTS if name == "cost" else "",
     )  # fmt: skip
@@ -75,9 +75,9 @@ def pivot(
     cells = means(frame[frame["metric"].isin(usable) | ~frame["usable"]], *keys, "metric")
     wide = cells.unstack("metric", sort=False).astype(object)
     wide = wide.where(wide.notna(), None)[[metric.name for metric in metrics]]
-    methods = {method: place for place, method in enumerate(run.ordered(wide.index.get_level_values(-1)))}
-    garments = {garment: place for place, garment in enumerate(run.garments(table_rows))}
-    outer = {key[:-1]: place for place, key in reversed(list(enumerate(wide.index)))}
+    methods = {method: k for k, method in enumerate(run.ordered(wide.index.get_level_values(-1)))}
+    garments = {garment: k for k, garment in enumerate(run.garments(table_rows))}
+    outer = {key[:-1]: k for k, key in reversed(list(enumerate(wide.index)))}
     last = len(keys) - 1
 
     def order(line: tuple[Cell, ...]) -> tuple[int, int, int]:

@@ -200,10 +200,14 @@ def metric_column(metric: Metric) -> Column:
 
 
 def table(
-    name: str, columns: Sequence[Column], rows: Sequence[tuple[Cell, ...]], caption: str = "", **more: Any
+    name: str,
+    columns: Sequence[Column],
+    rows: Sequence[tuple[Cell, ...]],
+    caption: str = "",
+    **fields: Any,
 ) -> list[Table]:
     """Return the table in a list, which is empty where the table has no rows."""
-    return [Table(name, tuple(columns), tuple(rows), caption, **more)] if rows else []
+    return [Table(name, tuple(columns), tuple(rows), caption, **fields)] if rows else []
 
 
 def _csv_text(cell: Cell) -> str:
@@ -253,8 +257,8 @@ def column_texts(run: Run, column: Column, cells: Sequence[Cell]) -> list[CellTe
         spread, mark = "", ""
         if isinstance(cell, Mean):
             mark = ("" if cell.complete else "*") + ("†" if cell.stalled else "")
-            if (apart := cell.spread_or_uncertainty) and abs(cell.value) >= column.rounding:
-                spread = f"± {duration(apart) if column.unit == 's' else number(apart, 1)}"
+            if (deviation := cell.spread_or_uncertainty) and abs(cell.value) >= column.rounding:
+                spread = f"± {duration(deviation) if column.unit == 's' else number(deviation, 1)}"
         elif isinstance(cell, Effect):
             mark = ("" if cell.complete else "*") + _COVERED.get(cell.covers, "")
             ends = cell.interval or ()

@@ -47,18 +47,18 @@ def paper_table(run: Run) -> Table:
     """Return the methods on the first garment, or in all scenes, with columns that the run has."""
     rows = run.garment_rows[run.garment_rows["garment"] == run.first_garment]
     rows = run.cells() if rows.empty else rows
-    apart = {"", *run.standing_apart(rows), *run.twins, *run.with_role("reference-variant")}
-    rows = rows[~rows["method"].isin(apart)]
+    omissions = {"", *run.standing_apart(rows), *run.twins, *run.with_role("reference-variant")}
+    rows = rows[~rows["method"].isin(omissions)]
     usable, excesses = rows[rows["usable"]], with_relative_excess(run, rows)
     timed, _ = timed_rows(run, rows)
     queries = [(name, rows) for name in METRICS] + [(run_time(timed), timed)]
-    sources = [(run.metrics[name], of) for name, of in queries if name in set(of[of["usable"]]["metric"])]
+    sources = [(run.metrics[n], part) for n, part in queries if n in set(part[part["usable"]]["metric"])]
     lines: list[tuple[Cell, ...]] = []
     for method in run.ordered(usable["method"]):
         of_method = usable[(usable["method"] == method) & usable["metric"].isin((TOTAL, *METRICS))]
         common = excess_of(run, excesses, method) if method != run.reference else None
         effects = [own_excess_of(run, rows, method), common.effect if common else None]
-        effects += [_mean(of, method, metric) for metric, of in sources]
+        effects += [_mean(part, method, metric) for metric, part in sources]
         counts = of_method["scene"].map(recording_of).nunique(), of_method["seed"].nunique()
         lines.append((method, *counts, *(effect and _cell(effect) for effect in effects)))
     columns = [
@@ -84,9 +84,9 @@ def _mean(rows: pd.DataFrame, method: str, metric: Metric) -> Effect | None:
     if mean is None:
         return None
     zero = replace(mean, value=0.0, cells=dict.fromkeys(mean.cells, 0.0), seeded=False, pairing_group="")
-    least = -math.inf if min(mean.cells.values()) < 0.0 else 0.0
-    far = effect_of(metric, mean, replace(zero, moved={}, uncertainty=None))
-    return replace(far, possible=(least, math.inf))
+    low = -math.inf if min(mean.cells.values()) < 0.0 else 0.0
+    effect = effect_of(metric, mean, replace(zero, moved={}, uncertainty=None))
+    return replace(effect, possible=(low, math.inf))
 
 
 def _cell(effect: Effect) -> Effect | float:

@@ -60,14 +60,14 @@ def published_part(request: str) -> str:
         ValueError: words of no known form.
         KeyError: a name that is not there.
     """
-    what, _, source = request.partition(" of ")
+    subject, _, source = request.partition(" of ")
     names, *lists = source.split(";")
     columns, methods = (_words(text) for text in (*lists, "", "")[:2])
     folders = [PUBLISHED / name for name in _words(names)]
-    kind, _, name = what.partition(" ")
+    kind, _, name = subject.partition(" ")
     if (part := request.partition(";")[0]) in PARTS:
         return markdown_table(chosen_rows(PARTS[part](), columns))
-    if what == "table overview" and methods:
+    if subject == "table overview" and methods:
         return markdown_table(_overview(folders, columns, methods))
     forms: dict[str, Callable[[], str | Rows]] = {
         "docstring": lambda: docstring_rows(source),
@@ -107,19 +107,19 @@ def claim_rows(family: str, folders: Sequence[Path]) -> Rows:
     left_out = slice(4, 4 if family == "primary" else 5)  # others are shown without p
     rows = [["Claim", "Tested", "Effect", "Interval", "p", "Verdict"]]
     before = ""
-    for claim in (claim for claim in FAMILIES[family] if claim in verdicts):
+    for claim in (c for c in FAMILIES[family] if c in verdicts):
         relation = f"{labels[claim.lower]} {claim.relation} {labels[claim.higher]}"
         says, before = "" if claim.says == before else claim.says, claim.says
         name, line = verdicts[claim]
-        far = line.compared.effect
-        effect, interval = DASH, DASH
-        if far is not None:
-            effect = ("×" if far.scale == RATIO else "") + number(far.shown)
-            interval = " to ".join(number(end) for end in far.interval or ()) or DASH
+        effect = line.compared.effect
+        size, interval = DASH, DASH
+        if effect is not None:
+            size = ("×" if effect.scale == RATIO else "") + number(effect.shown)
+            interval = " to ".join(number(end) for end in effect.interval or ()) or DASH
         p = DASH if line.p is None else number(line.p, 2)
         tested = f"{measure_of(line.compared).heading}: {relation}"
-        by = "" if name == folders[0].name else f" (`{name}`)"
-        rows.append([says, tested, effect, interval, p, line.verdict + line.remark + by])
+        source = "" if name == folders[0].name else f" (`{name}`)"
+        rows.append([says, tested, size, interval, p, line.verdict + line.remark + source])
     for row in rows:
         del row[left_out]
     return rows
@@ -134,18 +134,18 @@ def front_sentences(run: Run) -> str:
     Raises:
         KeyError: the method or claim of which a number is missing.
     """
-    worn = run.garment_rows
-    rows, (timed, _) = with_relative_excess(run, worn), timed_rows(run, worn)
+    frame = run.garment_rows
+    rows, (timed, _) = with_relative_excess(run, frame), timed_rows(run, frame)
     names = (NETWORK, "supervised", "pbns", SOLVER)
     excesses = {name: excess for name in names if (excess := excess_of(run, rows, name))}
     p_values = {line.claim.says: line.p for line in judged(run) if line.p is not None}
-    alike, swing, times = (
-        {name: mean.value for name in names if (mean := mean_of(of, name, metric))}
-        for of, metric in ((worn, ALIKE), (worn, SWING), (timed, WHOLE))
+    likeness, swing, times = (
+        {name: mean.value for name in names if (mean := mean_of(part, name, metric))}
+        for part, metric in ((frame, ALIKE), (frame, SWING), (timed, WHOLE))
     )
     supervised, pbns, stopped = (f"{number(excesses[name].typical, 2)} %" for name in names[1:])
     interval = " to ".join(number(end, 2) for end in excesses[SOLVER].effect.interval or ())
-    worst, most = excesses[NETWORK].worst
+    scene, peak = excesses[NETWORK].worst
     lines = (
         f"**{verdict(run, rows)}**\n",
         f"- Good at: energy for its time. Supervised has {supervised} "
@@ -154,10 +154,10 @@ def front_sentences(run: Run) -> str:
         f"{run.label(SOLVER)}, has {stopped} ({interval or DASH}) and takes "
         f"{number(times[SOLVER] / times[NETWORK], 1)} times as long as SNUG.",
         "- Bad at: dynamics and unfamiliar motion. Its hem's correlation with the simulation's "
-        f"is {number(alike[NETWORK], 2)} "
-        f"(Supervised {number(alike['supervised'], 2)}), "
+        f"is {number(likeness[NETWORK], 2)} "
+        f"(Supervised {number(likeness['supervised'], 2)}), "
         f"its amplitude {number(100.0 * swing[NETWORK], 1)} % of the simulation's; "
-        f"worst energy excess: {number(most, 2)} %, in {worst.partition('/')[2]}.",
+        f"worst energy excess: {number(peak, 2)} %, in {scene.partition('/')[2]}.",
     )
     return "\n".join(lines)
 
@@ -183,14 +183,14 @@ def _overview(folders: Sequence[Path], columns: Sequence[str], methods: Sequence
     return [heads, *(rows[name] for name in methods)]
 
 
-def _table(folder: Path, name: str, wanted: Sequence[str], methods: Sequence[str]) -> str:
+def _table(folder: Path, name: str, columns: Sequence[str], methods: Sequence[str]) -> str:
     """Return a table of a run: these columns and methods, all where none is named; what its marks mean."""
     run, table = read_published(folder), _made(folder, name)
-    place = next((place for place, column in enumerate(table.columns) if column.method), 0)
+    place = next((k for k, column in enumerate(table.columns) if column.method), 0)
     lines = [row for row in table.rows if not methods or row[place] in methods]
-    if absent := set(methods) - {str(row[place]) for row in lines}:
-        raise KeyError(f"{name} of {folder.name}: {', '.join(sorted(absent))}")
-    rows = text_rows(run, replace(table, rows=tuple(lines)), wanted)
+    if rest := set(methods) - {str(row[place]) for row in lines}:
+        raise KeyError(f"{name} of {folder.name}: {', '.join(sorted(rest))}")
+    rows = text_rows(run, replace(table, rows=tuple(lines)), columns)
     return f"{markdown_table(rows)}\n\n{remarks_on(rows)}".strip()
 
 

@@ -31,14 +31,14 @@ def time_rows(costs: Sequence[tuple[Run, Table]], methods: Sequence[str]) -> lis
     published = pd.read_csv(PUBLISHED / "times" / "published.csv")
     measured: dict[str, tuple[str, ...]] = {}
     for run, table in reversed(costs):
-        places = {column.name: place for place, column in enumerate(table.columns)}
+        places = {column.name: k for k, column in enumerate(table.columns)}
         for row in table.rows:
             method, *means = (row[places[name]] for name in ("method", *OURS))
-            here = [number(mean.value if isinstance(mean, Mean) else None) for mean in means]
-            measured[str(method)] = run.label(str(method)), *here
+            times = [number(mean.value if isinstance(mean, Mean) else None) for mean in means]
+            measured[str(method)] = run.label(str(method)), *times
     sources = {name: rows.to_numpy().tolist() for name, rows in published.groupby("method", sort=False)}
     rows: list[tuple[str, ...]] = [HEADS]
     for name in dict.fromkeys([*methods, *(name for name in sources if name not in measured)]):
-        label, *here = measured.get(name, (name, *[DASH] * 3))
-        rows += [(label, *how, *here) for _, *how in sources.get(name, [[name, *[DASH] * 3]])]
+        label, *times = measured.get(name, (name, *[DASH] * 3))
+        rows += [(label, *cells, *times) for _, *cells in sources.get(name, [[name, *[DASH] * 3]])]
     return rows

@@ -26,7 +26,7 @@ def text_rows(run: Run, table: Table, columns: Sequence[str] = ()) -> list[list[
     Raises:
         KeyError: for a column that the table has not.
     """
-    places = {column.name: place for place, column in enumerate(table.columns)}
+    places = {column.name: k for k, column in enumerate(table.columns)}
     texts: list[list[str]] = []
     for place in (places[name] for name in columns or places):
         column, cells = table.columns[place], [row[place] for row in table.rows]

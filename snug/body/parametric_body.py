@@ -133,8 +133,8 @@ class Body:
             for start in range(0, len(transforms), _CHUNK):
                 part = transforms[start : start + _CHUNK]
                 columns = part.transpose(1, 3, 0, 2).reshape(spread.shape[1], -1)
-                each = (spread @ columns).reshape(len(points), -1, 3)
-                posed[start : start + _CHUNK] = each.transpose(1, 0, 2)
+                vertices = (spread @ columns).reshape(len(points), -1, 3)
+                posed[start : start + _CHUNK] = vertices.transpose(1, 0, 2)
             return posed
 
         return pose

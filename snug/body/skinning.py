@@ -46,8 +46,8 @@ def add_pose_correctives(
     """
     count = directions.shape[2] // 9
     world = transforms[..., :3]
-    above = world[..., [int(parents[joint]) for joint in range(1, count + 1)], :, :]
-    relative = above.transpose(-1, -2) @ world[..., 1 : count + 1, :, :]
+    bases = world[..., [int(parents[joint]) for joint in range(1, count + 1)], :, :]
+    relative = bases.transpose(-1, -2) @ world[..., 1 : count + 1, :, :]
     entries = (relative - torch.eye(3, dtype=world.dtype, device=world.device)).flatten(-3)
     return points + (entries @ directions.flatten(0, 1).T).unflatten(-1, (-1, 3))
 

@@ -78,10 +78,10 @@ def _read_arrays(path: Path) -> Arrays:
     content = read(path, names)
     arrays = {}
     for key, synonyms in SYNONYMS.items():
-        if present := [content[name] for name in synonyms if name in content]:
-            arrays[key] = present[0]
-    if missing := [" or ".join(SYNONYMS[key]) for key in REQUIRED if key not in arrays]:
-        raise BodyError(f"no array {', '.join(missing)}; expected SMPL's layout")
+        if hits := [content[name] for name in synonyms if name in content]:
+            arrays[key] = hits[0]
+    if gaps := [" or ".join(SYNONYMS[key]) for key in REQUIRED if key not in arrays]:
+        raise BodyError(f"no array {', '.join(gaps)}; expected SMPL's layout")
     return arrays
 
 
@@ -90,8 +90,8 @@ def _numbers(arrays: Arrays, key: str, shape: tuple[int | None, ...]) -> np.ndar
     array = arrays[key]
     fits = array.ndim == len(shape) and all(n is None or n == m for n, m in zip(shape, array.shape))
     if not fits or array.dtype.kind not in "fiu" or 0 in array.shape:
-        wanted = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
-        raise BodyError(f"{key} is {array.dtype} {array.shape}; expected numbers of shape {wanted}")
+        layout = "(" + ", ".join("any" if n is None else str(n) for n in shape) + ")"
+        raise BodyError(f"{key} is {array.dtype} {array.shape}; expected numbers of shape {layout}")
     array = array.astype(np.float64)
     if bad := np.count_nonzero(~np.isfinite(array)):
         raise BodyError(f"{key} has {bad} values that are not finite")
@@ -109,8 +109,8 @@ def _make_body(arrays: Arrays) -> Body:
     joints, joint_directions = _joints(arrays, template, directions, len(folded))
     correctives = None
     if "posedirs" in arrays:  # folded fingers, jaw and eyes stay straight and need none
-        kept = 9 * ((JOINTS if len(folded) == JOINTS else BODY_JOINTS) - 1)
-        correctives = _numbers(arrays, "posedirs", (count, 3, 9 * (len(folded) - 1)))[:, :, :kept].copy()
+        width = 9 * ((JOINTS if len(folded) == JOINTS else BODY_JOINTS) - 1)
+        correctives = _numbers(arrays, "posedirs", (count, 3, 9 * (len(folded) - 1)))[:, :, :width].copy()
     body = Body(
         template=template,
         shape_directions=directions,
@@ -132,17 +132,17 @@ def _skeleton(arrays: Arrays, count: int) -> tuple[np.ndarray, np.ndarray, np.nd
     """
     table = arrays["kintree_table"]
     parents = table[0] if table.ndim == 2 else table
-    wanted = "kintree_table (2, J) or parents (J,) of J = 24 (SMPL), 52 (SMPL-H) or 55 (SMPL-X) joints"
+    layouts = "kintree_table (2, J) or parents (J,) of J = 24 (SMPL), 52 (SMPL-H) or 55 (SMPL-X) joints"
     if parents.ndim != 1 or len(parents) not in (24, 52, 55) or table.dtype.kind not in "iuf":
-        raise BodyError(f"the tree of joints is {table.dtype} {table.shape}; expected {wanted}")
+        raise BodyError(f"the tree of joints is {table.dtype} {table.shape}; expected {layouts}")
     joints = len(parents)
     weights = _numbers(arrays, "weights", (count, joints))
     sums = weights.sum(axis=1, keepdims=True)
     if weights.min() < -1e-6 or np.abs(sums - 1.0).max() > 1e-3:
         raise BodyError("weights must be non-negative with rows that sum to one")
     for joint in range(1, joints):
-        known = (PARENTS[joint],) if joint < BODY_JOINTS else (*FOLDED, *range(BODY_JOINTS, joint))
-        if parents[joint] not in known:
+        hosts = (PARENTS[joint],) if joint < BODY_JOINTS else (*FOLDED, *range(BODY_JOINTS, joint))
+        if parents[joint] not in hosts:
             raise BodyError(f"the tree of joints is not SMPL's: joint {joint} hangs on {parents[joint]}")
     places, folded = np.eye(JOINTS, joints), np.eye(joints, JOINTS)
     places[BODY_JOINTS:], folded[BODY_JOINTS:] = 0.0, 0.0
@@ -180,11 +180,11 @@ def _check_place(template: np.ndarray, joints: np.ndarray) -> None:
             f"v_template is {size[1]:.3g} high along y, {size[0]:.3g} wide and {size[2]:.3g} deep; "
             "expected a standing body in metres, y up"
         )
-    outside = np.flatnonzero((joints < low - 0.02).any(axis=1) | (joints > high + 0.02).any(axis=1))
-    if len(outside):
-        place = ", ".join(f"{x:.3g}" for x in joints[outside[0]])
+    strays = np.flatnonzero((joints < low - 0.02).any(axis=1) | (joints > high + 0.02).any(axis=1))
+    if len(strays):
+        place = ", ".join(f"{x:.3g}" for x in joints[strays[0]])
         raise BodyError(
-            f"joint {JOINT_NAMES[outside[0]]} at ({place}) is outside of the body; "
+            f"joint {JOINT_NAMES[strays[0]]} at ({place}) is outside of the body; "
             "give joints in metres and in SMPL's order"
         )
     at = {name: joints[JOINT[name]] for name in JOINT}
@@ -192,11 +192,11 @@ def _check_place(template: np.ndarray, joints: np.ndarray) -> None:
         raise BodyError("the left shoulder is not at larger x, or the neck not above; turn it to face +z")
     if abs(at["pelvis"][0]) > 0.05:
         raise BodyError(f"the pelvis is {at['pelvis'][0]:.3g} m beside x = 0; shift the body")
-    for (side, out), (limb, near, far) in product((("left", 1), ("right", -1)), LIMITS):
-        bone = at[f"{side}_{far}"] - at[f"{side}_{near}"]
+    for (side, out), (limb, start, end) in product((("left", 1), ("right", -1)), LIMITS):
+        bone = at[f"{side}_{end}"] - at[f"{side}_{start}"]
         straight = out * bone[0] if limb == "arm" else -bone[1]
         angle = np.degrees(np.arccos(straight / np.linalg.norm(bone)))
-        if not angle <= LIMITS[limb, near, far]:
+        if not angle <= LIMITS[limb, start, end]:
             raise BodyError(
                 f"the {side} {limb} is {angle:.0f} degrees off the T pose; pose it so at rest"
             )

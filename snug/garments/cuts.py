@@ -70,8 +70,8 @@ class CutPlane:
 
 def _saturated_square(x: Array) -> Array:
     """Return x^2 up to BEND_SPAN, constant from twice that on, with a continuous slope."""
-    missing = np.maximum(2 * BEND_SPAN - np.abs(x), 0.0)
-    return np.where(np.abs(x) <= BEND_SPAN, x**2, 2 * BEND_SPAN**2 - missing**2)
+    room = np.maximum(2 * BEND_SPAN - np.abs(x), 0.0)
+    return np.where(np.abs(x) <= BEND_SPAN, x**2, 2 * BEND_SPAN**2 - room**2)
 
 
 SEAM_CUT = CutPlane(SEAM, (-1.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -137,8 +137,8 @@ def cut_sheet(surface: ImplicitSurface, cuts: list[CutPlane]) -> tuple[Array, In
         # Clipping interpolates linearly along edges: onto a bent cut by one Newton step.
         points = np.asarray(sheet.points, dtype=np.float64)
         off = cut.beyond(points)
-        near = np.abs(off) < 2e-4
-        points[near] -= off[near, None] * cut.normals(points[near])
+        rim = np.abs(off) < 2e-4
+        points[rim] -= off[rim, None] * cut.normals(points[rim])
         sheet.points = points
     sheet = sheet.triangulate().clean(tolerance=1e-6).connectivity("largest")
     points = np.asarray(sheet.points, dtype=np.float64)
@@ -158,21 +158,21 @@ def outlines(points: Array, faces: Index, cuts: list[CutPlane]) -> list[list[tup
     loops = []
     for loop in boundary_loops(faces):
         distance = np.abs(np.stack([cut.beyond(points[loop]) for cut in cuts]))
-        on = distance < 1e-5
-        corners = np.flatnonzero(on.sum(axis=0) > 1)
+        hits = distance < 1e-5
+        corners = np.flatnonzero(hits.sum(axis=0) > 1)
         if len(corners) == 0:
             loops.append([(cuts[int(np.argmin(distance.sum(axis=1)))].name, points[loop])])
             continue
-        loop, on = np.roll(loop, -corners[0]), np.roll(on, -corners[0], axis=1)
+        loop, hits = np.roll(loop, -corners[0]), np.roll(hits, -corners[0], axis=1)
         # Clipping can leave a corner twice, some micrometres apart: the second of the two is dropped.
-        corner = on.sum(axis=0) > 1
-        kept = ~(corner & np.roll(corner, 1) & (on == np.roll(on, 1, axis=1)).all(axis=0))
-        loop, on = loop[kept], on[:, kept]
-        stops = [*np.flatnonzero(on.sum(axis=0) > 1), len(loop)]
+        corner = hits.sum(axis=0) > 1
+        twin = corner & np.roll(corner, 1) & (hits == np.roll(hits, 1, axis=1)).all(axis=0)
+        loop, hits = loop[~twin], hits[:, ~twin]
+        stops = [*np.flatnonzero(hits.sum(axis=0) > 1), len(loop)]
         ring = np.append(loop, loop[0])
         curves = []
         for begin, end in pairwise(stops):
-            middle = np.flatnonzero(on[:, begin + 1 : end].all(axis=1))
+            middle = np.flatnonzero(hits[:, begin + 1 : end].all(axis=1))
             if len(middle) != 1 or end - begin < 2:
                 raise ValueError("nothing fits this body: its surface is open where no cut is")
             curves.append((cuts[int(middle[0])].name, points[ring[begin : end + 1]]))

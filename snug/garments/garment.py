@@ -113,8 +113,8 @@ def smooth_weights(values: ArrayLike, faces: Index, iterations: int) -> Array:
     """
     smooth = np.asarray(values, dtype=np.float64)
     halves = half_edges(faces)
-    both = np.unique(np.concatenate([halves, halves[:, ::-1]]), axis=0)
-    neighbours = coo_array((np.ones(len(both)), tuple(both.T)), shape=(len(smooth),) * 2).tocsr()
+    pairs = np.unique(np.concatenate([halves, halves[:, ::-1]]), axis=0)
+    neighbours = coo_array((np.ones(len(pairs)), tuple(pairs.T)), shape=(len(smooth),) * 2).tocsr()
     degree = np.asarray(neighbours.sum(axis=1)).reshape(-1, 1)
     for _ in range(iterations):
         smooth = 0.5 * smooth + 0.5 * (neighbours @ smooth) / degree
@@ -142,13 +142,13 @@ def find_weights(body: Body, positions: Array, faces: Index) -> tuple[Array, Ind
     nearest = corners[np.arange(len(corners)), closest.barycentric.argmax(axis=1)]
     weights = np.einsum("va,vaj->vj", closest.barycentric, body.skinning_weights[corners])
     hip, middle = joint_position(body, "left_hip")[1], joint_position(body, "pelvis")[0]
-    below = hip - positions[:, 1]
-    lowest = faces[(below[faces] > 0.5 * below.max()).all(axis=1)]
-    beside = positions[lowest, 0] > middle
-    if below.max() > BELOW_HIPS and (beside.any(axis=1) & ~beside.all(axis=1)).any():
+    drop = hip - positions[:, 1]
+    lowest = faces[(drop[faces] > 0.5 * drop.max()).all(axis=1)]
+    is_left = positions[lowest, 0] > middle
+    if drop.max() > BELOW_HIPS and (is_left.any(axis=1) & ~is_left.all(axis=1)).any():
         # As far as a template's skirt, whatever the size of the triangles.
         smooth = smooth_weights(weights, faces, round(SKIRT_SMOOTHING * len(positions) / 1000))
-        share = np.clip(below / BELOW_HIPS, 0.0, 1.0)[:, None]
+        share = np.clip(drop / BELOW_HIPS, 0.0, 1.0)[:, None]
         weights = (1 - share) * weights + share * smooth
     return weights, nearest
 

@@ -48,8 +48,8 @@ CROTCH_BONES = ("pelvis", "left_hip", "right_hip")
 
 def skin_following(body: Body, names: Sequence[str]) -> NDArray[np.bool_]:
     """Return which body vertices (B,) have one of the joints `names` as their strongest skinning weight."""
-    wanted = [JOINT[name] for name in names]
-    return np.isin(np.argmax(body.skinning_weights, axis=1), wanted)
+    joints = [JOINT[name] for name in names]
+    return np.isin(np.argmax(body.skinning_weights, axis=1), joints)
 
 
 def joint_position(body: Body, name: str) -> Array:
@@ -107,7 +107,7 @@ def _smooth_minimum(a: Array, b: Array, reach: float) -> Array:
 
 def _section_support(points: Array, edges: Index, levels: Array, axis: int, normals: Array) -> Array:
     """Return the support function (L,K) of the body's sections at `levels` along `axis`; -inf without one."""
-    others = [i for i in range(3) if i != axis]
+    plane = [i for i in range(3) if i != axis]
     start, end = points[edges[:, 0]], points[edges[:, 1]]
     support = np.full((len(levels), len(normals)), -np.inf)
     for row, level in enumerate(levels):
@@ -115,7 +115,7 @@ def _section_support(points: Array, edges: Index, levels: Array, axis: int, norm
         a, b = start[crossing], end[crossing]
         rise = b[:, axis] - a[:, axis]
         share = np.where(rise == 0, 0.0, (level - a[:, axis]) / np.where(rise == 0, 1.0, rise))
-        cut = (a + share[:, None] * (b - a))[:, others]
+        cut = (a + share[:, None] * (b - a))[:, plane]
         if len(cut):
             support[row] = (cut @ normals.T).max(axis=0)
     return support
@@ -123,8 +123,8 @@ def _section_support(points: Array, edges: Index, levels: Array, axis: int, norm
 
 def _fill_levels(support: Array) -> Array:
     """Give levels without a section the section of the nearest level that has one."""
-    known = np.flatnonzero(np.isfinite(support[:, 0]))
-    nearest = known[np.abs(np.arange(len(support))[:, None] - known).argmin(axis=1)]
+    rows = np.flatnonzero(np.isfinite(support[:, 0]))
+    nearest = rows[np.abs(np.arange(len(support))[:, None] - rows).argmin(axis=1)]
     return support[nearest]
 
 
@@ -167,11 +167,11 @@ def _torso(sections: _Sections, edges: Index, hang: float, growth: Array, narrow
     mirrored = (SUPPORT_DIRECTIONS // 2 - np.arange(SUPPORT_DIRECTIONS)) % SUPPORT_DIRECTIONS
     # Both sides of a body that is not quite symmetric.
     support = np.maximum(support, support[:, mirrored])
-    below = np.flatnonzero(y <= hang)
-    fall = narrowing * y[below, None]
-    support[below] = np.maximum.accumulate((support[below] - fall)[::-1], axis=0)[::-1] + fall
+    rows = np.flatnonzero(y <= hang)
+    fall = narrowing * y[rows, None]
+    support[rows] = np.maximum.accumulate((support[rows] - fall)[::-1], axis=0)[::-1] + fall
     smooth = ndimage.gaussian_filter1d(support, 0.03 / GRID_SPACING, axis=0, mode="nearest")
-    support[below] = np.maximum(smooth, support)[below]
+    support[rows] = np.maximum(smooth, support)[rows]
     shoulder = joint_position(sections.body, "left_shoulder")[1]
     return np.maximum(sections.field(support, growth, 1), (y - shoulder)[None, :, None])
 
@@ -195,8 +195,8 @@ def _leg(sections: _Sections, edges: Index, crotch: float, ease: float, clearanc
         sections.support(edges, 1), 0.03 / GRID_SPACING, axis=0, mode="nearest"
     )
     # Legs that part once do not meet again above: up from the knee the inner side only comes nearer.
-    above, inner = np.flatnonzero(y >= knee), sections.normals[:, 0] < 0
-    support[np.ix_(above, inner)] = np.maximum.accumulate(support[np.ix_(above, inner)], axis=0)
+    rows, inner = np.flatnonzero(y >= knee), sections.normals[:, 0] < 0
+    support[np.ix_(rows, inner)] = np.maximum.accumulate(support[np.ix_(rows, inner)], axis=0)
     growth = clearance + ease / (2 * np.pi) * _ramp(-y, -crotch, -knee)
     return np.maximum(sections.field(support, growth, 1), (y - hip)[None, :, None])
 
@@ -207,10 +207,10 @@ def legs_part(body: Body, room: float) -> float:
     knee, hip = (joint_position(body, name)[1] for name in ("left_knee", "left_hip"))
     levels = np.arange(knee, hip, 0.5 * GRID_SPACING)
     inner = _fill_levels(_section_support(points, edges, levels, 1, np.array([[-1.0, 0.0]])))[:, 0]
-    near = np.flatnonzero(np.maximum.accumulate(inner) > -room)
+    rows = np.flatnonzero(np.maximum.accumulate(inner) > -room)
     middle = skin_following(body, CROTCH_BONES) & (np.abs(points[:, 0]) < max(room, GRID_SPACING))
     crotch = points[middle, 1].min(initial=levels[-1]) - room  # of legs that are apart all the way up
-    return float(min(levels[near[0]], crotch) if len(near) else crotch)
+    return float(min(levels[rows[0]], crotch) if len(rows) else crotch)
 
 
 def _edges(body: Body, bones: Sequence[str]) -> Index:

@@ -45,10 +45,10 @@ def delaunay_flips(points: Array, faces: Index, *, passes: int = 3) -> Index:
     """Flip interior edges whose two opposite angles add up to more than pi; return the faces."""
     faces = faces.copy()
     for _ in range(passes):
-        ends, sides, far = edge_table(faces, len(points))
+        ends, sides, tips = edge_table(faces, len(points))
         inner = (sides >= 0).all(axis=1)
-        ends, sides, far = ends[inner], sides[inner], far[inner]
-        p, q, r, s = points[ends[:, 0]], points[ends[:, 1]], points[far[:, 0]], points[far[:, 1]]
+        ends, sides, tips = ends[inner], sides[inner], tips[inner]
+        p, q, r, s = points[ends[:, 0]], points[ends[:, 1]], points[tips[:, 0]], points[tips[:, 1]]
         excess = _angle_cotangent(r, p, q) + _angle_cotangent(s, p, q)
         # A flip must not turn a triangle over: both new normals agree with the old ones' sum.
         normal = np.cross(q - p, r - p) + np.cross(p - q, s - q)
@@ -58,15 +58,15 @@ def delaunay_flips(points: Array, faces: Index, *, passes: int = 3) -> Index:
         candidates = np.flatnonzero((excess < -1e-6) & kept_side)
         if not len(candidates):
             break
-        present = {tuple(edge) for edge in np.sort(half_edges(faces), 1).tolist()}
+        edges = {tuple(edge) for edge in np.sort(half_edges(faces), 1).tolist()}
         touched = np.zeros(len(faces), dtype=bool)
         for e in candidates[np.argsort(excess[candidates], kind="stable")]:
-            (a, b), (f, g), (c, d) = ends[e], sides[e], far[e]
+            (a, b), (f, g), (c, d) = ends[e], sides[e], tips[e]
             edge = (int(min(c, d)), int(max(c, d)))
-            if touched[f] or touched[g] or edge in present:
+            if touched[f] or touched[g] or edge in edges:
                 continue
             touched[[f, g]] = True
-            present.add(edge)
+            edges.add(edge)
             faces[f], faces[g] = (a, d, c), (b, c, d)
     return faces
 
@@ -258,7 +258,7 @@ def _keep_off(body: Body, points: Array, faces: Index, cuts: list[CutPlane], cle
     raise ValueError(f"{1000 * lack.max():.2f} mm of clearance missing")
 
 
-def _check_even(points: Array, faces: Index, wanted: int) -> None:
+def _check_even(points: Array, faces: Index, count: int) -> None:
     """Raise ValueError for a triangle too small, large or sharp, and for another number of openings."""
     areas = corner_areas(points[faces])
     ratio = areas / areas.mean()
@@ -268,11 +268,11 @@ def _check_even(points: Array, faces: Index, wanted: int) -> None:
     if smallest < SMALLEST_ANGLE:
         raise ValueError(f"an angle of {smallest:.1f} degrees")
     openings = len(boundary_loops(faces))
-    if openings != wanted:
-        raise ValueError(f"{openings} openings instead of {wanted}")
+    if openings != count:
+        raise ValueError(f"{openings} openings instead of {count}")
 
 
 def nearest_body_vertices(body: Body, positions: Array, bones: Sequence[str] = SHIRT_BONES) -> Index:
     """Return the nearest template vertex (V,) that follows one of `bones` to each position (V,3) [m]."""
-    allowed = np.flatnonzero(skin_following(body, bones))
-    return allowed[cKDTree(body.template[allowed]).query(positions)[1]]
+    skin = np.flatnonzero(skin_following(body, bones))
+    return skin[cKDTree(body.template[skin]).query(positions)[1]]

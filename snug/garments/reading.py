@@ -149,8 +149,8 @@ def _misfit(body: Body, skin: Obstacle, positions: Array, faces: Index, distance
         return f"it lies up to {1e3 * depth:.0f} mm deep in the body, with {share:.0%} of it"
     corners = positions[faces]
     at_ends = np.asarray(skin_following(body, ENDS)[body.faces].all(axis=1))
-    near = at_ends[skin.planes(corners.mean(axis=1), 0).faces]
-    share = np.average(near, weights=corner_areas(corners))
+    ends = at_ends[skin.planes(corners.mean(axis=1), 0).faces]
+    share = np.average(ends, weights=corner_areas(corners))
     return f"{share:.0%} of it lies around head, hands or feet" if share > 0.5 else ""
 
 
@@ -158,13 +158,13 @@ def _wind_outward(
     positions: Array, faces: Index, chart: Array | None, skin: Obstacle
 ) -> tuple[Index, Array | None]:
     """Return faces and chart, each piece wound one way, with its outside on the outside."""
-    given, faces = faces, np.asarray(igl.bfs_orient(faces)[0], dtype=np.int64)
+    source, faces = faces, np.asarray(igl.bfs_orient(faces)[0], dtype=np.int64)
     corners = positions[faces]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     outward = np.einsum("fi,fi->f", normals, skin.planes(corners.mean(axis=1), 0).normals) > 0
     areas, pieces = np.linalg.norm(normals, axis=1), piece_of_faces(faces)
     turned = (np.bincount(pieces, areas * outward) <= OUTWARD * np.bincount(pieces, areas))[pieces]
-    turned ^= (faces != given).any(axis=1)
+    turned ^= (faces != source).any(axis=1)
     if chart is not None:
         chart = np.where(turned[:, None, None], chart[:, ::-1], chart)
-    return np.ascontiguousarray(np.where(turned[:, None], given[:, ::-1], given)), chart
+    return np.ascontiguousarray(np.where(turned[:, None], source[:, ::-1], source)), chart

@@ -83,8 +83,8 @@ class GarmentTemplate:
                 sound mesh comes out.
         """
         if unknown := measures.keys() - self.measures.keys():
-            known = ", ".join(["vertices", *self.measures])
-            raise GarmentError(f"{min(unknown)}: no measure of a {self.name}: use {known}")
+            names = ", ".join(["vertices", *self.measures])
+            raise GarmentError(f"{min(unknown)}: no measure of a {self.name}: use {names}")
         cut = {**self.measures, **measures}
         for name, value in {"vertices": vertices, **cut}.items():
             low, high, unit = self.ranges.get(name) or RANGES[name]
@@ -104,8 +104,8 @@ class GarmentTemplate:
         if self.smoothing:
             weights = smooth_weights(borrowed, faces, round(self.smoothing * vertices / 1000))
         if self.smoothing and "waist" not in loops:
-            above = positions[:, 1] - joint_position(body, "left_hip")[1]
-            share = np.clip(above / SMOOTHED_OVER + 0.5, 0.0, 1.0)[:, None]
+            height = positions[:, 1] - joint_position(body, "left_hip")[1]
+            share = np.clip(height / SMOOTHED_OVER + 0.5, 0.0, 1.0)[:, None]
             weights = share * borrowed + (1 - share) * weights
         pins = np.sort(loops.get("waist", np.empty(0, dtype=np.int64)))
         return Garment(self.name, positions, faces, nearest, weights, loops, pins)
@@ -113,9 +113,9 @@ class GarmentTemplate:
 
 def _sleeves(body: Body, cut: Measures, end: str = "left_elbow") -> Outline:
     """Outline a garment with two sleeves, a neck and a hem. Sleeves go from the shoulder towards `end`."""
-    shoulder, far = joint_position(body, "left_shoulder"), joint_position(body, end)
+    shoulder, tip = joint_position(body, "left_shoulder"), joint_position(body, end)
     hem = joint_position(body, "left_hip")[1] - cut["length"]
-    cuff = shoulder[0] + cut["sleeve"] * (far[0] - shoulder[0])
+    cuff = shoulder[0] + cut["sleeve"] * (tip[0] - shoulder[0])
     neck = neck_cut(body, cut["clearance"])
     sleeve = CutPlane("left_sleeve", (1.0, 0.0, 0.0), (cuff, 0.0, 0.0))
     surface = {"hem": hem, "cuff": cuff, "top": neck.point[1] + 0.04, "ease": cut["ease"],

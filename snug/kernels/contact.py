@@ -95,14 +95,14 @@ def byte_normals(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
     Normals of faces are summed up in the order of the faces, TRAINING_LANES frames side by side.
     """
     L, (count, vertices, _) = TRAINING_LANES, positions.shape
-    size, given, normals = 3 * vertices, positions.ravel(), np.empty(positions.shape, np.int8)
+    size, points, normals = 3 * vertices, positions.ravel(), np.empty(positions.shape, np.int8)
     skin, sums, out = np.empty(size * L, np.float32), np.empty(size * L, np.float32), normals.ravel()
     u, rounded = np.empty(9 * L, np.float32), np.empty(3 * L, np.int8)
     for start in range(0, count, L):
-        present = min(L, count - start)
+        lanes = min(L, count - start)
         for i in range(size):
             for n in range(L):
-                skin[L * i + n] = given[size * (start + min(n, present - 1)) + i]
+                skin[L * i + n] = points[size * (start + min(n, lanes - 1)) + i]
         sums[:] = np.float32(0.0)
         for f in range(len(faces)):
             for corner in range(3):
@@ -126,7 +126,7 @@ def byte_normals(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
                 u[2 * L + n] = np.rint(factor * z)
             for n in range(3 * L):
                 rounded[n] = u[n]
-            for n in range(present):
+            for n in range(lanes):
                 for axis in range(3):
                     out[size * (start + n) + 3 * v + axis] = rounded[axis * L + n]
     return normals
@@ -184,9 +184,9 @@ def contact_energy(
             for c in range(3):
                 garment[3 * v + c] = x[block, v, c, lane]
         body = positions[rows[window, frame]]
-        given, given_normals = body.ravel(), normals[rows[window, frame]].ravel()
-        for c in range(len(given)):
-            skin[c], m[c] = given[c], given_normals[c]
+        points, directions = body.ravel(), normals[rows[window, frame]].ravel()
+        for c in range(len(points)):
+            skin[c], m[c] = points[c], directions[c]
         anchors, parts = anchor_faces[frames[window, frame]], barycentric[frames[window, frame]]
         total = 0.0
         for s in range(len(stencils)):

@@ -142,11 +142,11 @@ def _multiply(
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
 def _handle(
-    added: bool, functions: np.ndarray, numbers: np.ndarray, y: np.ndarray, padded: int, apart: int
+    added: bool, functions: np.ndarray, numbers: np.ndarray, y: np.ndarray, padded: int, stride: int
 ) -> None:
     """Write or add the offsets of a block: A [f_0 ... f_3], of numbers A (3, 4) and shape functions."""
     for c in range(3):
-        a, at = numbers[c * apart :], y[c * padded :]
+        a, at = numbers[c * stride :], y[c * padded :]
         a0, a1, a2, a3 = a[0], a[1], a[2], a[3]
         for i in range(VERTEX_BLOCK):
             moved = a0 * functions[i] + a1 * functions[VERTEX_BLOCK + i]

@@ -38,9 +38,9 @@ def to_lanes(x: Tensor) -> np.ndarray:
 
 def from_lanes(lanes: np.ndarray, windows: int, frames: int) -> Tensor:
     """Return (C, ..., TRAINING_LANES) as (N, T, ...), the inverse of `to_lanes`."""
-    apart = windows % TRAINING_LANES == 0  # then no block holds frames of two times
-    x = torch.from_numpy(lanes).unflatten(0, (frames if apart else 1, -1)).movedim(-1, 2).flatten(1, 2)
-    if not apart:
+    whole = windows % TRAINING_LANES == 0  # then no block holds frames of two times
+    x = torch.from_numpy(lanes).unflatten(0, (frames if whole else 1, -1)).movedim(-1, 2).flatten(1, 2)
+    if not whole:
         x = x[0, : frames * windows].unflatten(0, (frames, windows))
     return x.transpose(0, 1)
 

@@ -57,9 +57,9 @@ def read_asf_amc(path: Path, options: MotionFileOptions) -> Motion:
     Raises:
         MotionError: no skeleton, a damaged file, or a skeleton without the bones of CMU's.
     """
-    beside = (file for file in path.parent.glob("*") if file.suffix.lower() == ".asf")
-    begins = [file for file in beside if re.match(re.escape(file.stem) + r"(?![^\W_])", path.stem)]
-    file = max(begins, key=lambda file: len(file.stem), default=None)
+    files = (file for file in path.parent.glob("*") if file.suffix.lower() == ".asf")
+    matches = [file for file in files if re.match(re.escape(file.stem) + r"(?![^\W_])", path.stem)]
+    file = max(matches, key=lambda file: len(file.stem), default=None)
     if file is None:
         subject = path.stem.split("_")[0]
         raise MotionError(f"its skeleton {subject}.asf is missing; put it beside the clip")
@@ -67,8 +67,8 @@ def read_asf_amc(path: Path, options: MotionFileOptions) -> Motion:
         bones, metres = read_asf(file)
     except MotionError as error:
         raise MotionError(f"its skeleton {file.name}, {error}") from None
-    if missing := [bone for bone in JOINT_BONES.values() if bone not in bones]:
-        raise MotionError(f"{file.name} has no bone '{missing[0]}'; only CMU's bone names are read")
+    if gaps := [bone for bone in JOINT_BONES.values() if bone not in bones]:
+        raise MotionError(f"{file.name} has no bone '{gaps[0]}'; only CMU's bone names are read")
     leg = bones["lfemur"].length + bones["ltibia"].length
     if leg <= 0.0:
         raise MotionError(f"the left leg of {file.name} has no length; fetch the skeleton again")
@@ -117,38 +117,38 @@ def read_asf(path: Path) -> tuple[dict[str, Bone], float]:
 def _parse_bones(lines: Iterator[list[str]]) -> tuple[dict[str, Bone], float]:
     section, metres, bone = "", INCH, Bone()
     bones, unattached = {"root": Bone()}, dict[str, Bone]()
-    for name, *words in lines:
+    for name, *tokens in lines:
         word = name.lower()
         if word.startswith(":"):
             section = word
-        elif (word == "angle" and words != ["deg"]) or (word == "axis" and words[-1:] != ["XYZ"]):
+        elif (word == "angle" and tokens != ["deg"]) or (word == "axis" and tokens[-1:] != ["XYZ"]):
             raise ValueError("only angles in degrees and axes in the order XYZ are read")
         elif section == ":units" and word == "length":
-            [unit] = finite_numbers(words, 1)
+            [unit] = finite_numbers(tokens, 1)
             if unit <= 0:
                 raise ValueError("the unit of length must be positive")
             metres = INCH / unit  # CMU's lengths times 1 / unit are inches
         elif section == ":root" and word == "order":
-            bones["root"].channels = _channels(words, TRANSLATIONS + ROTATIONS)
+            bones["root"].channels = _channels(tokens, TRANSLATIONS + ROTATIONS)
         elif section == ":root" and word in ("position", "orientation"):
-            if any(finite_numbers(words, 3)):
+            if any(finite_numbers(tokens, 3)):
                 raise ValueError("only roots at the origin and without a turn are read")
         elif section == ":bonedata" and word == "name":
-            bone = unattached.setdefault(" ".join(words), Bone())
+            bone = unattached.setdefault(" ".join(tokens), Bone())
         elif section == ":bonedata" and word == "direction":
-            direction = np.array(finite_numbers(words, 3))
+            direction = np.array(finite_numbers(tokens, 3))
             length = float(np.linalg.norm(direction))
             if not 1e-6 < length < 1e6:
                 raise ValueError("a bone's direction cannot be zero, nor so long")
             bone.direction = direction / length
         elif section == ":bonedata" and word == "length":
-            bone.length = finite_numbers(words, 1)[0] * metres
+            bone.length = finite_numbers(tokens, 1)[0] * metres
         elif section == ":bonedata" and word == "axis":
-            bone.axes = product(ROTATIONS, np.radians([finite_numbers(words[:3], 3)]))[0]
+            bone.axes = product(ROTATIONS, np.radians([finite_numbers(tokens[:3], 3)]))[0]
         elif section == ":bonedata" and word == "dof":
-            bone.channels = _channels(words, ROTATIONS)
+            bone.channels = _channels(tokens, ROTATIONS)
         elif section == ":hierarchy" and word not in ("begin", "end"):
-            for child in words:
+            for child in tokens:
                 if name not in bones or child not in unattached:
                     raise ValueError(
                         f"'{child}' has no entry in :bonedata, two parents, or one not joined to the root"
@@ -160,10 +160,10 @@ def _parse_bones(lines: Iterator[list[str]]) -> tuple[dict[str, Bone], float]:
     return bones, metres
 
 
-def _channels(words: Sequence[str], allowed: tuple[str, ...]) -> tuple[str, ...]:
-    channels = tuple(word.lower() for word in words)
-    if unknown := [channel for channel in channels if channel not in allowed]:
-        raise ValueError(f"channel '{unknown[0]}' is not supported here; known are {' '.join(allowed)}")
+def _channels(tokens: Sequence[str], choices: tuple[str, ...]) -> tuple[str, ...]:
+    channels = tuple(word.lower() for word in tokens)
+    if unknown := [channel for channel in channels if channel not in choices]:
+        raise ValueError(f"channel '{unknown[0]}' is not supported here; known are {' '.join(choices)}")
     return channels
 
 
@@ -173,23 +173,23 @@ def read_amc(path: Path, bones: dict[str, Bone], metres: float) -> dict[str, np.
 
     def parse(lines: Iterator[list[str]]) -> list[dict[str, list[float]]]:
         frames: list[dict[str, list[float]]] = []
-        for word, *words in lines:
+        for word, *tokens in lines:
             if word.lower() == ":radians":
                 raise ValueError("only angles in degrees are read")
             if word.startswith(":"):
                 continue
-            if not words and word.isdigit():
+            if not tokens and word.isdigit():
                 frames.append({})
             elif word not in moving or not frames:
                 raise ValueError(f"'{word[:40]}' is no bone of the skeleton, or before the first frame")
             else:
-                frames[-1][word] = finite_numbers(words, moving[word])
+                frames[-1][word] = finite_numbers(tokens, moving[word])
         return frames
 
     frames = parse_lines(path, parse, comment="#")
     for number, frame in enumerate(frames, 1):
-        if missing := moving.keys() - frame.keys():
-            raise MotionError(f"frame {number} is cut off before bone '{min(missing)}'; fetch it again")
+        if gaps := moving.keys() - frame.keys():
+            raise MotionError(f"frame {number} is cut off before bone '{min(gaps)}'; fetch it again")
     channels = {}
     for name in moving:
         scale = [np.pi / 180 if channel in ROTATIONS else metres for channel in bones[name].channels]

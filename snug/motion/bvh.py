@@ -36,7 +36,7 @@ class Joint:
 
 
 def read_bvh(path: Path, options: MotionFileOptions) -> Motion:
-    """Read a .bvh of one body, whatever its unit of length: the path is scaled by the length of the legs.
+    """Read a .bvh of one body, whatever its unit: the path is scaled by the length of the legs.
 
     Raises MotionError.
     """
@@ -50,15 +50,15 @@ def read_bvh(path: Path, options: MotionFileOptions) -> Motion:
     axes, leg = _standing({name: places[index] for name, index in matches.items()})
     places = places @ axes
     directions = {
-        near: places[matches[far]] - places[matches[near]]
-        for near, far in (LIMBS | FEET).items()
-        if far in matches
+        joint: places[matches[child]] - places[matches[joint]]
+        for joint, child in (LIMBS | FEET).items()
+        if child in matches
     }
     for ankle in FEET:
         if ankle in directions and directions[ankle][2] < -0.02 * leg:
             raise MotionError(f"{FEET[ankle]} points backwards; are left and right exchanged?")
     turned: dict[int, np.ndarray] = {}
-    for index in sorted({above for joint in matches.values() for above in way_up(parents, joint)}):
+    for index in sorted({link for joint in matches.values() for link in way_up(parents, joint)}):
         local = turns_of(joints[index], frames)
         turned[index] = turned[parents[index]] @ local if parents[index] >= 0 else local
     root, *chain = reversed(way_up(parents, matches["pelvis"]))
@@ -123,19 +123,19 @@ def _parse(lines: Iterator[list[str]]) -> tuple[list[Joint], np.ndarray, float |
     _expect(lines, "MOTION")
     [declared] = finite_numbers(_expect(lines, "Frames:"), 1)
     [seconds] = finite_numbers(_expect(lines, "Frame", "Time:"), 1)
-    rows = [np.array(finite_numbers(words, columns)) for words in lines]
+    rows = [np.array(finite_numbers(tokens, columns)) for tokens in lines]
     if len(rows) != declared:
         raise ValueError(f"declares {declared:g} frames and holds {len(rows)}")
     return joints, np.reshape(rows, (len(rows), columns)), 1.0 / seconds if seconds else None
 
 
 def _expect(lines: Iterator[list[str]], *expected: str) -> list[str]:
-    """Return what follows these words, in any case, on the next line. Raises ValueError for another line."""
-    words = next(lines, [])
-    if [word.lower() for word in words[: len(expected)]] != [word.lower() for word in expected]:
-        wanted = " ".join(expected)
-        raise ValueError(f"'{' '.join(words)[:40]}' where '{wanted}' should be; is it a .bvh file?")
-    return words[len(expected) :]
+    """Return what follows these words, in any case, on the next line, or raise ValueError."""
+    tokens = next(lines, [])
+    if [word.lower() for word in tokens[: len(expected)]] != [word.lower() for word in expected]:
+        header = " ".join(expected)
+        raise ValueError(f"'{' '.join(tokens)[:40]}' where '{header}' should be; is it a .bvh file?")
+    return tokens[len(expected) :]
 
 
 def _hierarchy(lines: Iterator[list[str]]) -> list[Joint]:
@@ -145,22 +145,22 @@ def _hierarchy(lines: Iterator[list[str]]) -> list[Joint]:
     columns = 0
     while not joints or open_joints:
         line = next(lines, ["the end"])
-        word, *words = line
+        word, *tokens = line
         word = word.lower()
         if word == ("joint" if joints else "root") or (word == "end" and joints):
-            name = "" if word == "end" else " ".join(words)
+            name = "" if word == "end" else " ".join(tokens)
             if name and name in [joint.name for joint in joints]:
                 raise ValueError(f"joint '{name[:40]}' has a name that is taken")
             joints.append(Joint(name, open_joints[-1] if open_joints else -1, first=columns))
             open_joints.append(len(joints) - 1)
             _expect(lines, "{")
         elif word == "offset" and open_joints:
-            joints[open_joints[-1]].offset = np.array(finite_numbers(words, 3))
+            joints[open_joints[-1]].offset = np.array(finite_numbers(tokens, 3))
         elif word == "channels" and open_joints[-1:] == [len(joints) - 1] and not joints[-1].channels:
-            joints[-1].channels = tuple(word.capitalize() for word in words[1:])
+            joints[-1].channels = tuple(word.capitalize() for word in tokens[1:])
             columns += len(joints[-1].channels)
-            known = CHANNELS.intersection(joints[-1].channels)
-            if not words[:1] == [str(len(words) - 1)] == [str(len(known))]:
+            names = CHANNELS.intersection(joints[-1].channels)
+            if not tokens[:1] == [str(len(tokens) - 1)] == [str(len(names))]:
                 raise ValueError(f"'{' '.join(line)[:60]}' declares other channels than it names")
         elif word == "}" and open_joints:
             open_joints.pop()

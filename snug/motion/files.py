@@ -64,15 +64,15 @@ def read_smpl_arrays(path: Path, options: MotionFileOptions) -> Motion:
         turns = np.concatenate([_triples(arrays, root, frames)[:, :1], turns], axis=1)
         name = f"{root} and {name}"
     if turns.shape[1] not in LAYOUTS:
-        known = ", ".join(f"{3 * joints} ({layout})" for joints, layout in LAYOUTS.items())
+        sizes = ", ".join(f"{3 * joints} ({layout})" for joints, layout in LAYOUTS.items())
         raise MotionError(
-            f"'{name}' has shape {arrays[name].shape}; give (frames, columns), columns one of {known}"
+            f"'{name}' has shape {arrays[name].shape}; give (frames, columns), columns one of {sizes}"
         )
     if are_positions(turns):
         raise MotionError(f"'{name}' holds positions of joints; give their rotations, axis-angle [rad]")
     poses = np.zeros((frames, len(JOINT_NAMES), 3))
-    kept = poses.shape[1] if turns.shape[1] == poses.shape[1] else BODY_JOINTS
-    poses[:, :kept] = turns[:, :kept]
+    count = poses.shape[1] if turns.shape[1] == poses.shape[1] else BODY_JOINTS
+    poses[:, :count] = turns[:, :count]
     place = _first(arrays, PATHS, "the root's path (frames, 3) [m]; zeros where it stays")
     translations = _triples(arrays, place, frames)[:, 0]
     stated = next((arrays[rate] for rate in RATES if rate in arrays), None)
@@ -88,8 +88,8 @@ def _first(arrays: Mapping[str, np.ndarray], names: tuple[str, ...], meaning: st
     for name in names:
         if name in arrays:
             return name
-    known = ", ".join(sorted(arrays)) or "none that is known"
-    raise MotionError(f"no array '{names[0]}' (found {known}); give {meaning}")
+    keys = ", ".join(sorted(arrays)) or "none that is known"
+    raise MotionError(f"no array '{names[0]}' (found {keys}); give {meaning}")
 
 
 def _triples(arrays: Mapping[str, np.ndarray], name: str, frames: int = 0) -> np.ndarray:
@@ -170,19 +170,19 @@ def _files_by_name(path: Path, options: MotionFileOptions) -> dict[str, Path]:
         listed = path.rglob("*") if options.split else path.iterdir()
         motion_files = sorted(file for file in listed if file.suffix.lower() in READERS)
         files = [f for f in motion_files if not any(fnmatch(f.name, shape) for shape in SHAPE_FILES)]
-    wanted = options.clips("train", "test")
+    clips = options.clips("train", "test")
     named: dict[str, Path] = {}
     for file in files:
         number = CMU_FILE.fullmatch(file.stem)
         name = number[1] if options.split and number else file.stem
-        if options.split and name not in wanted:
+        if options.split and name not in clips:
             continue
         if name in named:
             raise MotionError(f"{path}: {name} is in {named[name]} and {file}: leave one")
         named[name] = file
     if not named:
-        what = f"file of a clip of split {options.split}" if options.split else "motion file"
-        raise MotionError(f"{path}: holds no {what} ({readable}); give a folder of motion capture clips")
+        kind = f"file of a clip of split {options.split}" if options.split else "motion file"
+        raise MotionError(f"{path}: holds no {kind} ({readable}); give a folder of motion capture clips")
     return named
 
 

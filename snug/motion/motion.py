@@ -64,9 +64,9 @@ class Motion:
             )
         finite = np.isfinite(poses).all(axis=(1, 2)) & np.isfinite(translations).all(axis=1)
         if not finite.all():
-            wrong = f"{np.count_nonzero(~finite)} frames, from frame {finite.argmin()} on"
+            bad_frames = f"{np.count_nonzero(~finite)} frames, from frame {finite.argmin()} on"
             raise MotionError(
-                f"motion {self.name}: numbers are not finite in {wrong}; cut the clip there"
+                f"motion {self.name}: numbers are not finite in {bad_frames}; cut the clip there"
             )
         if not (np.isfinite(self.fps) and self.fps > 0):
             raise MotionError(f"motion {self.name}: {self.fps} frames per second; give a positive rate")
@@ -119,11 +119,11 @@ def clear_arms(motion: Motion) -> Motion:
     """
     for degrees in (20.0, 25.0, 30.0, 35.0, 40.0):
         spread = spread_arms(motion, degrees)
-        near = (arm_clearance(spread).min(axis=1) < ARMS_CLEAR).mean()
-        if near <= 0.05:
+        share = (arm_clearance(spread).min(axis=1) < ARMS_CLEAR).mean()
+        if share <= 0.05:
             return spread
     limit = f"{np.degrees(ARMS_CLEAR):.0f} degrees"
-    note = f"an upper arm within {limit} of the torso in {100 * near:.0f} % of frames"
+    note = f"an upper arm within {limit} of the torso in {100 * share:.0f} % of frames"
     return replace(spread, source=f"{spread.source}; {note}")
 
 
@@ -195,9 +195,9 @@ def turn_about_vertical(motion: Motion, angle: float) -> Motion:
 
 def mirror_motion(motion: Motion) -> Motion:
     """Mirror the motion in the plane x = 0: sides change, turns about y and z change sign."""
-    other = {"left": "right", "right": "left"}
+    swap = {"left": "right", "right": "left"}
     sides = (name.partition("_") for name in JOINT)
-    twin = [JOINT[f"{other.get(side, side)}{bar}{part}"] for side, bar, part in sides]
+    twin = [JOINT[f"{swap.get(side, side)}{bar}{part}"] for side, bar, part in sides]
     return replace(
         motion,
         name=f"{motion.name}_mirrored",

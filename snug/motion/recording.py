@@ -52,24 +52,24 @@ def parse_lines(
     except OSError as problem:
         raise MotionError(f"cannot be read ({problem.strerror or problem}); check the path") from None
     unread = iter(lines)
-    words = (line.partition(comment)[0].split() for line in unread)
+    rows = (line.partition(comment)[0].split() for line in unread)
     try:
-        return parse(filter(None, words))
+        return parse(filter(None, rows))
     except ValueError as problem:
         number = len(lines) - len(list(unread))
         raise MotionError(f"line {number}: {str(problem)[:300]}; export the file again") from None
 
 
-def finite_numbers(words: Sequence[str], count: int) -> list[float]:
-    """Return words as `count` finite numbers. Raises ValueError."""
-    values = [float(word) for word in words]
+def finite_numbers(tokens: Sequence[str], count: int) -> list[float]:
+    """Return tokens as `count` finite numbers. Raises ValueError."""
+    values = [float(word) for word in tokens]
     if len(values) != count or not all(map(math.isfinite, values)):
-        raise ValueError(f"'{' '.join(words)[:60]}' should be {count} finite numbers")
+        raise ValueError(f"'{' '.join(tokens)[:60]}' should be {count} finite numbers")
     return values
 
 
 def frame_rate(
-    frames: int, stated: float | None, given: float | None, usual: float | None = None
+    frames: int, stated: float | None, option: float | None, usual: float | None = None
 ) -> float:
     """Return the frames per second [1/s]: of the file, else of the options, else `usual` for such files.
 
@@ -77,9 +77,9 @@ def frame_rate(
         MotionError: there is none of them, file and options disagree, no recording has that rate, or the
             clip has no frame, more than MAX_FRAMES, or more than MAX_SECONDS.
     """
-    if stated is not None and given is not None and abs(stated - given) > 0.01 * stated:
-        raise MotionError(f"states {stated:g} frames per second, fps={given:g} is given; leave it out")
-    fps = next((value for value in (stated, given, usual) if value is not None), None)
+    if stated is not None and option is not None and abs(stated - option) > 0.01 * stated:
+        raise MotionError(f"states {stated:g} frames per second, fps={option:g} is given; leave it out")
+    fps = next((value for value in (stated, option, usual) if value is not None), None)
     if fps is None:
         raise MotionError("states no frame rate; add ,fps=N behind the path")
     if not LOWEST_RATE <= fps <= HIGHEST_RATE:
@@ -125,17 +125,17 @@ MAX_BONE_RATIO = 2.0  # between most bones' lengths, each relative to ours: a ch
 
 
 def are_positions(triples: np.ndarray) -> bool:
-    """Return whether triples (T, J, 3) of the joints of a body are their positions, in any unit.
+    """Return whether triples (T, J, 3) of a body's joints are their positions, in any unit.
 
     Positions: most joints keep their distance to another one, though they move; or the bones have the
     proportions of a person's in most frames, with the joints in our order. Rotations do neither.
     """
-    few = triples[:: -(-len(triples) // 100), :BODY_JOINTS]
-    distances = np.linalg.norm(few[:, :, None] - few[:, None], axis=-1)
-    moved = np.linalg.norm(few.std(axis=0), axis=-1)
+    part = triples[:: -(-len(triples) // 100), :BODY_JOINTS]
+    distances = np.linalg.norm(part[:, :, None] - part[:, None], axis=-1)
+    moved = np.linalg.norm(part.std(axis=0), axis=-1)
     rigid = distances.std(axis=0) < MAX_BONE_CHANGE * np.minimum(distances.mean(axis=0), moved[:, None])
-    near, far = list(PARENTS[1:BODY_JOINTS]), list(range(1, BODY_JOINTS))
-    ratios = distances[:, near, far] / np.linalg.norm(REST_JOINTS[far] - REST_JOINTS[near], axis=1)
+    start, end = list(PARENTS[1:BODY_JOINTS]), list(range(1, BODY_JOINTS))
+    ratios = distances[:, start, end] / np.linalg.norm(REST_JOINTS[end] - REST_JOINTS[start], axis=1)
     low, high = np.quantile(ratios, (0.1, 0.9))
     return bool(rigid.any(axis=1).mean() > 0.8 or 0.0 < high < MAX_BONE_RATIO * low)
 
@@ -233,17 +233,17 @@ def _doubt(motion: Motion, joints: np.ndarray, along: int) -> str:
     floor = np.median(floors, axis=0)
     offs = np.minimum(np.abs(floors), np.abs(floors + REST_JOINTS[0, 1]))
     walks = _walks(motion, along)
-    for other in {1, 2} - {along}:
-        near = heights[..., other] < ON_FLOOR
-        crawls = near[:, WRISTS].all(axis=1)
-        crawls &= near[:, LEGS].any(axis=1)
-        crawls &= heights[:, 0, other] > 2 * ON_FLOOR
+    for axis in {1, 2} - {along}:
+        touch = heights[..., axis] < ON_FLOOR
+        crawls = touch[:, WRISTS].all(axis=1)
+        crawls &= touch[:, LEGS].any(axis=1)
+        crawls &= heights[:, 0, axis] > 2 * ON_FLOOR
         if crawls.mean() > 0.5:
             return "wrists and feet, or knees, are on one level beside it"
-        flat = np.quantile(offs[:, other], 0.9) < LYING_ROOM
-        raised = abs(np.median(motion.translations[:, other])) > LYING_ROOM / 2
+        flat = np.quantile(offs[:, axis], 0.9) < LYING_ROOM
+        raised = abs(np.median(motion.translations[:, axis])) > LYING_ROOM / 2
         if flat and raised and not walks and abs(floor[along]) > FLOOR_ROOM:
-            return f"lies at height 0 along {'xyz'[other]}"
+            return f"lies at height 0 along {'xyz'[axis]}"
     if np.median(offs[:, along]) > FLOOR_ROOM and not walks:
         return f"stays in place with its feet at {floor[along]:.3g} m, not on a floor at 0"
     return ""

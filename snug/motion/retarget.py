@@ -22,9 +22,9 @@ from snug.motion.motion import MotionError
 
 # Joints whose limb points to the next joint.
 LIMBS = {
-    f"{side}_{near}": f"{side}_{far}"
+    f"{side}_{joint}": f"{side}_{child}"
     for side in ("left", "right")
-    for near, far in (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist"))
+    for joint, child in (("hip", "knee"), ("knee", "ankle"), ("shoulder", "elbow"), ("elbow", "wrist"))
 }
 FEET = {"left_ankle": "left_foot", "right_ankle": "right_foot"}
 # Axis about which a hinge bends in our rest pose. The limb above a hinge is aligned by the same axis.
@@ -140,9 +140,9 @@ def match_joints(names: Sequence[str], parents: Sequence[int]) -> dict[str, int]
     matches = _limbs(names)
     for ours in (f"{side}_{joint}" for side in SIDES for joint in NEEDED):
         if ours not in matches:
-            known = ", ".join(filter(None, names))
+            listing = ", ".join(filter(None, names))
             raise MotionError(
-                f"no joint is known as '{ours}'; rename it in the file (there are {known[:300]})"
+                f"no joint is known as '{ours}'; rename it in the file (there are {listing[:300]})"
             )
     return _trunk(names, parents, matches) | matches
 

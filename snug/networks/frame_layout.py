@@ -141,14 +141,14 @@ class FramePlan:
         scale: float = 1.0,
     ) -> None:
         rows, columns = matrix.shape
-        more = _up(rows, ROWS) - rows
-        matrix = np.pad(matrix, ((0, more), (0, _up(columns, COLUMNS) - columns)))
-        first = sum(map(len, self._matrices)), sum(map(len, self._terms))
-        self._operations.append((kind, *matrix.shape, *first, x.start, target))
+        pad = _up(rows, ROWS) - rows
+        matrix = np.pad(matrix, ((0, pad), (0, _up(columns, COLUMNS) - columns)))
+        starts = sum(map(len, self._matrices)), sum(map(len, self._terms))
+        self._operations.append((kind, *matrix.shape, *starts, x.start, target))
         self._matrices.append(matrix.ravel())
         self._terms += [
             np.full(len(matrix), scale, np.float32),
-            np.float32(scale) * np.pad(bias, (0, more)),
+            np.float32(scale) * np.pad(bias, (0, pad)),
         ]
 
 

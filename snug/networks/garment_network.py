@@ -166,9 +166,9 @@ def make_network(
         >>> tuple(offsets.shape), state
         ((2, 3, 4, 3), None)
     """
-    how = find_kind(kind)
+    spec = find_kind(kind)
     with seeded(seed):
-        network = how.network(inputs, vertices, *how.sizes)
+        network = spec.network(inputs, vertices, *spec.sizes)
         initialise(network, recipe.initialisation)
     network.output_scale = recipe.output_scale
     if recipe.zero_last_layer:

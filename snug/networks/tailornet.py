@@ -53,8 +53,8 @@ class FrequencyMixture(GarmentNetwork):
 
     def random_state(self, batch: int, sigma: float, generator: torch.Generator) -> Tensor:
         """Draw dropout masks (2, N, 1, 1024) from the training's own generator."""
-        kept = torch.rand((2, batch, 1, WIDTH), generator=generator, device=generator.device) >= DROPOUT
-        return kept.to(self.input_mean) / (1 - DROPOUT)
+        mask = torch.rand((2, batch, 1, WIDTH), generator=generator, device=generator.device) >= DROPOUT
+        return mask.to(self.input_mean) / (1 - DROPOUT)
 
     def bands(self, features: Tensor, masks: Tensor | None = None) -> tuple[Tensor, Tensor]:
         """Return the low and the high band of the offsets, each (N, T, V, 3) [m]."""

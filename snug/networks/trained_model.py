@@ -115,8 +115,8 @@ package: pbns-tshirt, ...
             raise ModelFileError(str(error)) from error
         try:
             if data["format"] != MODEL_FORMAT:
-                known = f"this version reads {MODEL_FORMAT!r}: train again"
-                raise ModelFileError(f"{path}: format {str(data['format'])[:40]!r}, {known}")
+                remedy = f"this version reads {MODEL_FORMAT!r}: train again"
+                raise ModelFileError(f"{path}: format {str(data['format'])[:40]!r}, {remedy}")
             recipe = Recipe.from_dict(data["recipe"])
             network = make_network(
                 data["kind"],
@@ -156,6 +156,6 @@ def _find_file(path: str | Path) -> Path:
     if isinstance(path, str) and path in networks:
         return networks[path]
     if isinstance(path, str) and not Path(path).suffix and not Path(path).exists():
-        known = ", ".join(networks)
-        raise ModelFileError(f"{path}: neither a model file nor a network of the package: {known}")
+        names = ", ".join(networks)
+        raise ModelFileError(f"{path}: neither a model file nor a network of the package: {names}")
     return Path(path)

@@ -104,12 +104,12 @@ def _mixed(
             source = mirror_motion(source)
         start = random.integers(max(1, source.frames - CLIP_FRAMES + 1))
         # A clip that is too short rests at its end.
-        taken = np.minimum(np.arange(start, start + CLIP_FRAMES), source.frames - 1)
+        frames = np.minimum(np.arange(start, start + CLIP_FRAMES), source.frames - 1)
         scale = random.uniform(*PART_SCALES.get(number, (1.0, 1.0)))
         joints = [JOINT[joint] for joint in part]
-        poses[:, joints] = scale * source.poses[taken][:, joints]
+        poses[:, joints] = scale * source.poses[frames][:, joints]
         if number == 0:
-            translations = source.translations[taken]
+            translations = source.translations[frames]
     seconds = np.arange(CLIP_FRAMES)[:, None] / fps
     for joint, share in TURN_SHARES.items():
         stays, swings = random.normal(0.0, share * turn, (2, 3))
@@ -147,9 +147,9 @@ def open_hips(motion: Motion) -> Motion:
     repeatedly.
     """
     for _ in range(HIP_ROUNDS):
-        missing = np.maximum(0.0, np.deg2rad(HIP_DEGREES) - lap_clearance(motion))
+        turns = np.maximum(0.0, np.deg2rad(HIP_DEGREES) - lap_clearance(motion))
         poses = motion.poses.copy()
-        for hip, angles in zip(HIPS, missing.T):
+        for hip, angles in zip(HIPS, turns.T):
             back = rotation_matrices(angles[:, None] * SIDEWAYS)
             poses[:, hip] = axis_angles(back @ rotation_matrices(poses[:, hip]))
         motion = replace(motion, poses=poses)

@@ -71,9 +71,9 @@ class CapturedTrainer(Trainer):
         accepted = self.guard.accepts(verdict, norm)
         assert verdict == "update" and accepted
         self._following()
-        after, posed = self._held["after"], self._held["posed"]
-        if self.hidden_states and after is not None:
-            self.hidden_states.keep(frames[:, -1], after)
+        end, posed = self._held["end"], self._held["posed"]
+        if self.hidden_states and end is not None:
+            self.hidden_states.keep(frames[:, -1], end)
         if self.contact:
             self.contact.settle(frames, trusted=True)
             self.contact.requery(frames, posed, self._held["x"])
@@ -83,41 +83,41 @@ class CapturedTrainer(Trainer):
         self, frames: np.ndarray, betas: np.ndarray | None, state: Tensor | None
     ) -> tuple[dict[str, np.ndarray], float]:
         """Return the terms (N, T) [J] of the windows, and the gradient norm; gradients are then in place."""
-        given = {"rows": torch.as_tensor(frames), "first": torch.as_tensor(first_places(frames.ravel()))}
+        inputs = {"rows": torch.as_tensor(frames), "first": torch.as_tensor(first_places(frames.ravel()))}
         if betas is not None:
-            given["betas"] = torch.as_tensor(betas)
+            inputs["betas"] = torch.as_tensor(betas)
         if state is not None:
-            given["state"] = state
-        self._names = tuple(given)
-        self._held = self._descent(*given.values())
+            inputs["state"] = state
+        self._names = tuple(inputs)
+        self._held = self._descent(*inputs.values())
         numbers = self._held["numbers"].cpu().numpy()
         terms = numbers[:-1].reshape(self._held["shape"])
         return dict(zip(self._held["terms"], terms.swapaxes(0, 1))), float(numbers[-1])
 
     def _differentiated(self, *inputs: Tensor) -> dict[str, Any]:
         """Run forward and backward; return what the rest of the step reads. inputs: see `_gradients`."""
-        given = dict(zip(self._names, inputs))
+        named = dict(zip(self._names, inputs))
         assert self.loss is not None
-        rows = given["rows"].to(self.device)
+        rows = named["rows"].to(self.device)
         self.optimiser.zero_grad(set_to_none=True)
-        batch = self.data.gathered(rows, given.get("betas"))
-        offsets, after = self.network(batch.features, given.get("state"))
+        batch = self.data.gathered(rows, named.get("betas"))
+        offsets, end = self.network(batch.features, named.get("state"))
         x = self.posed_by(offsets + batch.rest, self.weights, batch.transforms)
         planes = posed = anchors = None
         if self.contact:
             posed = self.contact.bodies.posed(batch)
-            anchors = self.contact.walked(rows.flatten(), given["first"], posed, x)
+            anchors = self.contact.walked(rows.flatten(), named["first"], posed, x)
             assert isinstance(self.contact.cache, TensorContactCache)
             at = self.contact.cache.planes_at(*anchors, *posed[1:])
             planes = at[0].unflatten(0, rows.shape), at[1].unflatten(0, rows.shape)
-        terms = self.loss(x, batch.ahead, planes, behind=batch.behind)
+        terms = self.loss(x, batch.lead, planes, lag=batch.lag)
         stacked = torch.stack(list(terms.values()), 1)  # (N, terms, T)
         stacked.sum(1).mean().backward()
         gradients = [p.grad for p in self.network.parameters() if p.grad is not None]
         norm = nn.utils.get_total_norm(gradients)
         return {
             "numbers": torch.cat([stacked.detach().flatten(), norm.flatten()]), "shape": stacked.shape,
-            "terms": tuple(terms), "x": x.detach(), "after": None if after is None else after.detach(),
+            "terms": tuple(terms), "x": x.detach(), "end": None if end is None else end.detach(),
             "posed": posed, "anchors": anchors, "rows": rows, "gradients": gradients,
         }  # fmt: skip
 

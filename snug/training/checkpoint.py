@@ -77,7 +77,7 @@ class Checkpoint:
 def describe_run(trainer: Trainer, **facts: Any) -> dict[str, Any]:
     """Return the facts that must be equal for two runs to be the same run."""
     digest, data, dressed = hashlib.sha256(), trainer.data, trainer.dressed
-    tensors = [data.features, data.transforms, data.ahead, data.rest, trainer.weights]
+    tensors = [data.features, data.transforms, data.lead, data.rest, trainer.weights]
     tensors += [trainer.targets.vertices] if trainer.targets else []
     body = dressed.body
     shape = (body.template, body.faces, body.shape_directions, body.joint_directions)

@@ -50,8 +50,8 @@ class Patch:
             raise ValueError(
                 f"no body face lies within {region} m of the garment: they do not fit together"
             )
-        kept = body_faces[reachable_faces(samples, middles, region)]
-        self.body_vertices, flat = np.unique(kept, return_inverse=True)
+        patch = body_faces[reachable_faces(samples, middles, region)]
+        self.body_vertices, flat = np.unique(patch, return_inverse=True)
         self.faces = flat.reshape(-1, 3).astype(np.int32)
         self.rest = body_positions[self.body_vertices].astype(np.float32)
         self.centroids = self.rest[self.faces].mean(axis=1)

@@ -95,21 +95,22 @@ class TensorContactCache:
         All of them take every turn, for a GPU that counts those near the skin waits for the count.
         """
         points, directions = self._planes(faces, barycentric, positions, normals)
-        near = ((x - points) * directions).sum(-1) < reach + WALK_SLACK
+        walks = ((x - points) * directions).sum(-1) < reach + WALK_SLACK
         row, face = _rows(faces), faces.long()
-        last, moving = face, near
+        last, moving = face, walks
         for _ in range(CROSSINGS):
             a, b, c = positions[row, self.corners[face]].unbind(-2)
             v, w, _ = foot(b - a, c - a, x - a)
             weights = torch.stack([1 - v - w, v, w], -1)
             other = self.adjacency[face, weights.argmin(-1)]
-            far = (self.centroids[other] - self.sample_rest).square().sum(-1) > self.patch.region**2
-            moving = moving & (weights.amin(-1) < 0) & (other >= 0) & (other != last) & ~far
+            squared = (self.centroids[other] - self.sample_rest).square().sum(-1)
+            outside = squared > self.patch.region**2
+            moving = moving & (weights.amin(-1) < 0) & (other >= 0) & (other != last) & ~outside
             last, face = torch.where(moving, face, last), torch.where(moving, other, face)
         a, b, c = positions[row, self.corners[face]].unbind(-2)
         v, w = closest_on_triangle(b - a, c - a, x - a)
         face, parts = face.to(faces.dtype), quantise(torch.stack([v, w], -1)).to(torch.uint8)
-        return torch.where(near, face, faces), torch.where(near[..., None], parts, barycentric)
+        return torch.where(walks, face, faces), torch.where(walks[..., None], parts, barycentric)
 
     def requery(self, frame: int, points: Tensor, positions: Tensor, *, exact: bool = False) -> None:
         """Search one frame's anchors anew: points (S, 3), positions (P, 3) of that frame.
@@ -127,31 +128,31 @@ class TensorContactCache:
 
     def _searched(self, points: Tensor, home: Tensor, positions: Tensor) -> tuple[Tensor, Tensor]:
         distances = torch.cdist(points, positions)
-        allowed = torch.cdist(home, self.rest) < self.patch.region
-        distances = torch.where(allowed | ~allowed.any(1, keepdim=True), distances, torch.inf)
+        inside = torch.cdist(home, self.rest) < self.patch.region
+        distances = torch.where(inside | ~inside.any(1, keepdim=True), distances, torch.inf)
         nearest = distances.topk(min(NEAREST, len(positions)), largest=False).indices
         faces = self.around[nearest].flatten(1)  # (S, NEAREST K)
         a, b, c = positions[self.corners[faces.clamp(min=0)]].unbind(-2)
         s, t, r = b - a, c - a, points[:, None] - a
         v, w = closest_on_triangle(s, t, r)
         squared = (r - v[..., None] * s - w[..., None] * t).square().sum(-1)
-        far = (self.centroids[faces.clamp(min=0)] - home[:, None]).square().sum(
+        outside = (self.centroids[faces.clamp(min=0)] - home[:, None]).square().sum(
             -1
         ) >= self.patch.region**2
-        squared = torch.where(faces < 0, torch.inf, squared + FORBIDDEN * far)
+        squared = torch.where(faces < 0, torch.inf, squared + FORBIDDEN * outside)
         best = squared.argmin(1, keepdim=True)
         pick = [table.gather(1, best)[:, 0] for table in (faces, v, w)]
         return pick[0], torch.stack(pick[1:], -1)
 
 
 def first_places(frames: np.ndarray) -> np.ndarray:
-    """Return for each of frames (N,) the place where it comes first.
+    """Return the place where each of frames (N,) comes first.
 
     >>> first_places(np.array([7, 5, 7]))
     array([0, 1, 0])
     """
-    _, first, again = np.unique(frames, return_index=True, return_inverse=True)
-    return first[again]
+    _, first, places = np.unique(frames, return_index=True, return_inverse=True)
+    return first[places]
 
 
 def _rows(faces: Tensor) -> Tensor:

@@ -40,12 +40,12 @@ class BodyPatches:
     """The patch of a body, its `vertices` (P,), in every frame of a training set.
 
     normals: vertex normals (N, P, 3) of positions (N, P, 3). kernels: pose arrays, else tensors by torch on
-    the set's device. kept: whether each frame has one body for good; the kernels then pose them all once.
+    the set's device. fixed: whether each frame has one body for good; kernels pose it once.
     """
 
     def __init__(
         self, data: TrainingSet, vertices: np.ndarray, normals: Callable[[Any], Any], *,
-        kernels: bool, kept: bool,
+        kernels: bool, fixed: bool,
     ) -> None:  # fmt: skip
         body, device = data.dressed.body, data.device
         self.data, self.kernels, self.normals = data, kernels, normals
@@ -58,7 +58,7 @@ class BodyPatches:
             correctives = body.pose_directions[vertices]
             self.correctives = torch.as_tensor(correctives, dtype=torch.float32, device=device)
         self._pose = compiled(self._posed_by_torch, device)
-        self.kept = self._posed_everywhere() if kept and self.kernels else None
+        self.kept = self._posed_everywhere() if fixed and self.kernels else None
 
     def posed(self, batch: Batch) -> Posed:
         """Return the body in the poses of a batch."""
@@ -147,7 +147,7 @@ class NearestVertices:
             for array in (body.faces, incident(body.faces))
         )
         vertices = np.arange(len(body.template))
-        self.bodies = BodyPatches(data, vertices, self._normals, kernels=False, kept=False)
+        self.bodies = BodyPatches(data, vertices, self._normals, kernels=False, fixed=False)
 
     def planes(self, batch: Batch, x: Tensor) -> tuple[Tensor, Tensor]:
         """Return points and normals (N, T, V, 3) of garments x (N, T, V, 3) in the poses of a batch [m]."""
@@ -180,10 +180,10 @@ NEAR, FIRST_NEAR = 0.03, 0.07
 class TrainingContact:
     """Anchors of all training frames, and the steps since each frame's were last searched or propagated.
 
-    kept: see BodyPatches; kernels: in numpy and numba, else in torch on the set's device.
+    fixed: see BodyPatches; kernels: in numpy and numba, else in torch on the set's device.
     """
 
-    def __init__(self, data: TrainingSet, contact: ContactPenalty, *, kept: bool, kernels: bool) -> None:
+    def __init__(self, data: TrainingSet, contact: ContactPenalty, *, fixed: bool, kernels: bool) -> None:
         body, device = data.dressed.body, data.device
         self.data, self.contact = data, contact
         self.kernels, self.age = kernels, np.zeros(data.frames, np.int64)
@@ -195,7 +195,7 @@ class TrainingContact:
             else TensorContactCache(self.patch, frames, device)
         )
         vertices, normals = self.patch.body_vertices, self.cache.normals
-        self.bodies = BodyPatches(data, vertices, normals, kernels=kernels, kept=kept)
+        self.bodies = BodyPatches(data, vertices, normals, kernels=kernels, fixed=fixed)
         self.stencils = torch.as_tensor(contact.stencils, device=device)
         self.sample_weights = torch.as_tensor(contact.weights, dtype=torch.float32, device=device)
         self._changed = np.zeros(frames, bool)
@@ -215,8 +215,8 @@ class TrainingContact:
         if isinstance(self.cache, ContactCache):
             cache, (of_body, *body) = self.cache, posed
             rows = of_body.reshape(batch.frames.shape)
-            where = batch.frames, rows, *body
-            return lambda lanes, into: cache.energy(self.contact, lanes, into, *where, walk=walk)
+            inputs = batch.frames, rows, *body
+            return lambda lanes, into: cache.energy(self.contact, lanes, into, *inputs, walk=walk)
         flat = batch.frames.ravel()
         frames = torch.as_tensor(flat, device=self.data.device)
         if x is not None:
@@ -239,17 +239,17 @@ class TrainingContact:
 
         It comes before training: a thigh found only later meets, with joules, a network that has settled.
         """
-        data, frame, done = self.data, 0, 0
-        while done < data.frames:
-            last, frame = frame, self._near(done, FIRST_REACH, FIRST_NEAR).stop - 1
+        data, frame, start = self.data, 0, 0
+        while start < data.frames:
+            source, frame = frame, self._near(start, FIRST_REACH, FIRST_NEAR).stop - 1
             batch = data.at(np.array([[frame]]))
             x = skin(batch.rest, weights, batch.transforms)
             rows, positions, _ = self.bodies.posed(batch)
-            self.cache.faces[frame] = self.cache.faces[last]  # a good place to begin
+            self.cache.faces[frame] = self.cache.faces[source]  # a good place to begin
             self.cache.requery(frame, self._samples(x[0, 0]), positions[rows[0]])
             end = self._near(frame, FIRST_REACH, FIRST_NEAR).stop
-            self._propagate(frame, np.arange(done, end))
-            done = end
+            self._propagate(frame, np.arange(start, end))
+            start = end
         self._changed[:] = False  # a resumed run makes these anchors again
 
     def requery(self, frames: np.ndarray, posed: Posed, x: Tensor) -> None:
@@ -267,10 +267,10 @@ class TrainingContact:
             around = self._near(int(frame), REACH, NEAR)
             self._propagate(int(frame), np.setdiff1d(np.arange(around.start, around.stop), searched))
 
-    def _near(self, frame: int, reach: int, near: float) -> slice:
+    def _near(self, frame: int, reach: int, shift: float) -> slice:
         """Return the frames around one, of the same motion and at most `reach` off.
 
-        They end where a mark has moved by `near` [m].
+        They end where a mark has moved by `shift` [m].
         """
         first = self.data.first
         motion = int(self.data.motion_of(frame))
@@ -278,9 +278,9 @@ class TrainingContact:
         stop = min(frame + reach + 1, int(first[motion + 1]))
         marks = self.bodies.marks
         moved = np.linalg.norm(marks[start:stop] - marks[frame], axis=2).max(axis=1)
-        far = (start + np.flatnonzero(moved > near)).tolist()
-        before, after = (f + 1 for f in far if f < frame), (f for f in far if f > frame)
-        return slice(max([start, *before]), min([stop, *after]))
+        ends = (start + np.flatnonzero(moved > shift)).tolist()
+        starts, stops = (f + 1 for f in ends if f < frame), (f for f in ends if f > frame)
+        return slice(max([start, *starts]), min([stop, *stops]))
 
     def _propagate(self, frame: int, others: np.ndarray) -> None:
         """Copy the anchors of a frame to others (n,), as if they had been searched."""

@@ -78,16 +78,16 @@ class CudaGraph:
             return self.function(*inputs)
         if self._graph is None:
             self._graph = self._captured(inputs)
-        for held, given in zip(self._inputs, inputs, strict=True):
-            assert (held.shape, held.dtype) == (given.shape, given.dtype), (
+        for slot, value in zip(self._inputs, inputs, strict=True):
+            assert (slot.shape, slot.dtype) == (value.shape, value.dtype), (
                 "a graph takes one size of inputs"
             )
-            held.copy_(given, non_blocking=True)
+            slot.copy_(value, non_blocking=True)
         self._graph.replay()
         return self._outputs
 
     def _captured(self, inputs: tuple[Tensor, ...]) -> torch.cuda.CUDAGraph:
-        self._inputs = tuple(given.to(self.device, copy=True) for given in inputs)
+        self._inputs = tuple(value.to(self.device, copy=True) for value in inputs)
         side, here = torch.cuda.Stream(self.device), torch.cuda.current_stream(self.device)
         side.wait_stream(here)
         with torch.cuda.stream(side):

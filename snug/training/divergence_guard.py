@@ -100,13 +100,13 @@ class DivergenceGuard:
         self._leave_out(highest, "gradient not finite, update left out")
         return False
 
-    def _leave_out(self, which: np.ndarray, action: str) -> None:
-        self._remark(which, action)
+    def _leave_out(self, mask: np.ndarray, action: str) -> None:
+        self._remark(mask, action)
         self.summary["skipped_updates"] += 1
         self.skipped_in_a_row += 1
         if self.skipped_in_a_row >= GIVE_UP:
-            last = self._name(int(np.argmax(which)))
-            raise TrainingError(f"training diverged: {GIVE_UP} updates in a row not finite, last {last}")
+            name = self._name(int(np.argmax(mask)))
+            raise TrainingError(f"training diverged: {GIVE_UP} updates in a row not finite, last {name}")
         self._count_bad()
 
     def _count_bad(self) -> bool:
@@ -127,8 +127,8 @@ class DivergenceGuard:
         self.bad_in_a_row = 0
         return True
 
-    def _remark(self, which: np.ndarray, action: str) -> None:
-        for row in np.flatnonzero(which).tolist():
+    def _remark(self, mask: np.ndarray, action: str) -> None:
+        for row in np.flatnonzero(mask).tolist():
             self.summary["high_windows"] += not action.startswith("weights")
             if len(self.summary["named_windows"]) < NAMED_WINDOWS:
                 window, value = self._name(row), repr(float(self._joules[row]))

@@ -71,16 +71,16 @@ class Trainer:
             raise TrainingError(f"seed={seed}: give a number from 0 to 2^63 - 1")
         if not motions:
             raise TrainingError("no motions to train on")
-        how = find_kind(kind)
-        self.kind, self.how, self.recipe, self.steps, self.seed = kind, how, recipe, steps, seed
+        spec = find_kind(kind)
+        self.kind, self.spec, self.recipe, self.steps, self.seed = kind, spec, recipe, steps, seed
         self.device = device
         self.kernels = device.type == "cpu" if kernels is None else kernels
         self.posed_by = FastSkin.apply if self.kernels else compiled(skin, device)
-        self.data = make_training_set(how, dressed, motions, recipe, seed=seed, device=device)
-        self.shaped = varies_shape(how, dressed, recipe) and recipe.shape_of == "window"
+        self.data = make_training_set(spec, dressed, motions, recipe, seed=seed, device=device)
+        self.shaped = varies_shape(spec, dressed, recipe) and recipe.shape_of == "window"
         self.dressed, self.weights = dressed, dressed.weights(recipe.smoothing).to(device)
         self.network = start_network(kind, self.data, seed=seed).to(device)
-        if how.closed_form:
+        if spec.closed_form:
             self.network.closed_form = self.kernels
         on_gpu = device.type == "cuda"
         self.optimiser = torch.optim.AdamW(
@@ -93,29 +93,29 @@ class Trainer:
         )
         self.random = np.random.default_rng(seed)
         self.noise = torch.Generator().manual_seed(seed)
-        self.windows = recipe.batch if how.network.sequential else recipe.batch * recipe.window
+        self.windows = recipe.batch if spec.network.sequential else recipe.batch * recipe.window
         self.order = np.empty(0, np.int64)
         self.epoch = 0
         self._set_losses(motions, trajectories)
         self.hidden_states: HiddenStateCache | None = None
         start = self.network.random_state(1, 0.0, torch.Generator())
         # A state belongs to one body.
-        if how.physics and recipe.remembered and not self.shaped and start is not None:
+        if spec.physics and recipe.remembered and not self.shaped and start is not None:
             states = start.shape[0], start.shape[-1]
             self.hidden_states = HiddenStateCache(self.data.first, states, device)
         self.guard = DivergenceGuard(
-            self.network, self.optimiser, spike=recipe.spike if how.physics else None
+            self.network, self.optimiser, spike=recipe.spike if spec.physics else None
         )
 
     def _set_losses(self, motions: Sequence[Motion], trajectories: Trajectories | None) -> None:
         """Set energies with their contact, distances from simulated vertices, and what they weigh."""
-        how, recipe = self.how, self.recipe
+        spec, recipe = self.spec, self.recipe
         self.loss: PhysicsLoss | None = None
         self.contact: TrainingContact | None = None
         self.nearest: NearestVertices | None = None  # in place of anchors
         self.targets: VertexTargets | None = None
-        how.check(recipe)
-        if how.physics or recipe.physics_weight:
+        spec.check(recipe)
+        if spec.physics or recipe.physics_weight:
             self.loss = PhysicsLoss(
                 self.dressed.cloth, recipe, dt=self.data.dt, device=self.device, kernels=self.kernels
             )
@@ -123,10 +123,10 @@ class Trainer:
                 self.nearest = NearestVertices(self.data)
             elif "collision" in recipe.terms:
                 self.contact = TrainingContact(
-                    self.data, self.loss.contact, kept=not self.shaped, kernels=self.kernels
+                    self.data, self.loss.contact, fixed=not self.shaped, kernels=self.kernels
                 )
-        if not how.physics:
-            self.targets = TARGETS[how.targets](self.data, motions, trajectories, self.weights)
+        if not spec.physics:
+            self.targets = TARGETS[spec.targets](self.data, motions, trajectories, self.weights)
         if self.contact:
             self.contact.search_first(self.weights)
         # Of energies beside simulated vertices in the loss; all other terms have 1.
@@ -171,7 +171,7 @@ class Trainer:
             return self._update(
                 number, windows, self.targets.terms(self.network, batch, state, self.posed_by)
             )[0]
-        offsets, after = self.network(batch.features, state)
+        offsets, end = self.network(batch.features, state)
         # Offsets first: the sum then lies in memory as they do.
         x = self.posed_by(offsets + batch.rest, self.weights, batch.transforms)
         distances = self.targets.distances(x, batch) if self.targets else {}
@@ -181,13 +181,13 @@ class Trainer:
             planes = self.contact.planes(batch, posed, x)
         elif self.nearest:
             planes = self.nearest.planes(batch, x)
-        terms = self.loss(x, batch.ahead, planes, behind=batch.behind)
+        terms = self.loss(x, batch.lead, planes, lag=batch.lag)
         if self.contact and posed and self._searched_for_high(number, batch.frames, posed, x, terms):
             planes = self.contact.planes(batch, posed)
-            terms = self.loss(x, batch.ahead, planes, behind=batch.behind)
+            terms = self.loss(x, batch.lead, planes, lag=batch.lag)
         means, trusted = self._update(number, windows, distances | terms)
-        if trusted and self.hidden_states and after is not None:
-            self.hidden_states.keep(batch.frames[:, -1], after)
+        if trusted and self.hidden_states and end is not None:
+            self.hidden_states.keep(batch.frames[:, -1], end)
         if self.contact and posed:
             self.contact.settle(batch.frames, trusted=trusted)
             if trusted:

@@ -118,11 +118,11 @@ def make_contact(cloth: Cloth, recipe: Recipe) -> ContactPenalty:
     """
     if recipe.material == "pbns":
         return SquaredContact(cloth)
-    options = {"margin": recipe.contact_margin, "stiffness": recipe.contact_stiffness}
-    given: dict[str, Any] = {name: value for name, value in options.items() if value is not None}
+    values = {"margin": recipe.contact_margin, "stiffness": recipe.contact_stiffness}
+    options: dict[str, Any] = {name: value for name, value in values.items() if value is not None}
     if recipe.contact_samples != "nearest_vertices":
-        return ContactPenalty(cloth, samples=recipe.contact_samples, **given)
-    contact = ContactPenalty(cloth, samples="vertices", **given)
+        return ContactPenalty(cloth, samples=recipe.contact_samples, **options)
+    contact = ContactPenalty(cloth, samples="vertices", **options)
     contact.stiffness[:] = contact.stiffness.mean()
     return contact
 
@@ -224,7 +224,7 @@ class PhysicsLoss:
                 warn_slow_path("training", "batch kernel", slow, instead)
 
     def __call__(
-        self, x: Tensor, ahead: Tensor, planes: Planes | None, *, behind: Tensor | None = None
+        self, x: Tensor, lead: Tensor, planes: Planes | None, *, lag: Tensor | None = None
     ) -> dict[str, Tensor]:
         """Return the energy of each window and frame, term -> (N, T) [J], whose mean over frames is the loss.
 
@@ -232,24 +232,24 @@ class PhysicsLoss:
 
         Args:
             x: (N, T, V, 3) [m], each frame relative to its own pelvis p.
-            ahead: 2 p_{t-1} - p_{t-2} - p_t, (N, T, 3) [m].
+            lead: 2 p_{t-1} - p_{t-2} - p_t, (N, T, 3) [m].
             planes: points and normals (N, T, S, 3) of the contact samples, or a kernel in lanes that
                 knows its planes; None leaves contact out.
-            behind: p_{t-1} - p_t, (N, T, 3) [m]; only the recipe's inertia_form `two_transitions` needs
+            lag: p_{t-1} - p_t, (N, T, 3) [m]; only the recipe's inertia_form `two_transitions` needs
                 it.
         """
         if not (self.kernels and x.dtype == torch.float32):
-            return self._definitions(x, ahead, planes, behind, {})
-        kernels = self._kernels(x, ahead, planes)
+            return self._definitions(x, lead, planes, lag, {})
+        kernels = self._kernels(x, lead, planes)
         closed = dict(zip(kernels, ClosedForms.apply(x, *kernels.values()) if kernels else ()))
-        return self._defined(x, ahead, planes, behind, closed)
+        return self._defined(x, lead, planes, lag, closed)
 
     def _defined(
         self,
         x: Tensor,
-        ahead: Tensor,
+        lead: Tensor,
         planes: Planes | None,
-        behind: Tensor | None,
+        lag: Tensor | None,
         closed: dict[str, Tensor],
     ) -> dict[str, Tensor]:
         """Return the energies of `__call__`: those of `closed`, and the others by their definitions."""
@@ -262,9 +262,7 @@ class PhysicsLoss:
             else:
                 terms[name] = energy.energy(x).sum(-1)
         if "inertia" in self.terms and x.shape[1] >= 3:
-            terms["inertia"] = (
-                closed["inertia"] if "inertia" in closed else self._inertia(x, ahead, behind)
-            )
+            terms["inertia"] = closed["inertia"] if "inertia" in closed else self._inertia(x, lead, lag)
         if "collision" in self.terms and planes is not None:
             terms["collision"] = (
                 self._contact.energy(x, *planes).sum(-1)
@@ -273,25 +271,25 @@ class PhysicsLoss:
             )
         return terms
 
-    def _kernels(self, x: Tensor, ahead: Tensor, planes: Planes | None) -> dict[str, BatchKernel]:
+    def _kernels(self, x: Tensor, lead: Tensor, planes: Planes | None) -> dict[str, BatchKernel]:
         """Return the kernels in lanes of the terms that have one, by name of the term."""
         kernels = dict(self._batches)
         in_lanes = self.inertia_form == "equation_5" and len(x) % TRAINING_LANES == 0
         if "inertia" in self.terms and x.shape[1] >= 3 and in_lanes:
             weight = x.shape[1] / (x.shape[1] - 2)
-            kernels["inertia"] = batch_of_windows(self.inertia, to_lanes(ahead), len(x), weight)
+            kernels["inertia"] = batch_of_windows(self.inertia, to_lanes(lead), len(x), weight)
         if "collision" in self.terms and callable(planes):
             kernels["collision"] = planes
         return kernels
 
-    def _inertia(self, x: Tensor, ahead: Tensor, behind: Tensor | None) -> Tensor:
+    def _inertia(self, x: Tensor, lead: Tensor, lag: Tensor | None) -> Tensor:
         """Return the recipe's form of inertia (N, T) [J], scaled as `__call__` has it."""
-        x_hat = 2 * x[:, 1:-1] - x[:, :-2] + ahead[:, 2:, None]
+        x_hat = 2 * x[:, 1:-1] - x[:, :-2] + lead[:, 2:, None]
         if self.inertia_form == "two_transitions":
-            assert behind is not None
-            x_hat = torch.cat([x[:, :1] + behind[:, 1:2, None], x_hat], 1)  # no velocity before the first
+            assert lag is not None
+            x_hat = torch.cat([x[:, :1] + lag[:, 1:2, None], x_hat], 1)  # no velocity before the first
         elif self.inertia_form == "detached_past":
             x_hat = x_hat.detach()
-        frames, judged = x.shape[1], x_hat.shape[1]
-        inertia = self.inertia.energy(x[:, -judged:], x_hat).sum(-1) * (frames / judged)
-        return torch.nn.functional.pad(inertia, (frames - judged, 0))
+        frames, count = x.shape[1], x_hat.shape[1]
+        inertia = self.inertia.energy(x[:, -count:], x_hat).sum(-1) * (frames / count)
+        return torch.nn.functional.pad(inertia, (frames - count, 0))

@@ -105,18 +105,18 @@ def write_data_set(
 
 
 def settings_of(body: Body, garment: Garment) -> dict[str, Any]:
-    """Return the facts that must be equal for simulations of a garment on a body to be of the same cloth."""
+    """Return the facts that must be equal for simulations to be of one cloth: a garment on a body."""
     weights = np.round(garment.skinning_weights[garment.pins], MICROMETRES)
-    rest = [np.round(garment.rest_positions, MICROMETRES), garment.faces, garment.pins, weights]
+    mesh = [np.round(garment.rest_positions, MICROMETRES), garment.faces, garment.pins, weights]
     if garment.rest_uv is not None:
-        rest.append(np.round(garment.rest_uv, MICROMETRES))
+        mesh.append(np.round(garment.rest_uv, MICROMETRES))
     skin = [body.template, body.skinning_weights, body.joint_template]
     if body.pose_directions is not None:
         skin.append(body.pose_directions)
     return {
         "garment": garment.name,
         "vertices": len(garment.rest_positions),
-        "mesh": _digest(rest),
+        "mesh": _digest(mesh),
         "material": asdict(garment.material),
         "body": _digest([*(np.round(array, MICROMETRES) for array in skin), body.faces]),
     }
@@ -223,15 +223,15 @@ def smooth_offsets(offsets: np.ndarray, faces: np.ndarray) -> np.ndarray:
     from scipy.sparse import coo_array, diags_array  # a network of another kind trains without scipy
 
     count = offsets.shape[1]
-    edges, beside, _ = edge_table(faces, count)
-    alone = (beside < 0).any(axis=1)
+    edges, sides, _ = edge_table(faces, count)
+    border = (sides < 0).any(axis=1)
     on_rim = np.zeros(count, dtype=bool)
-    on_rim[edges[alone]] = True
+    on_rim[edges[border]] = True
     pairs = np.concatenate([edges, edges[:, ::-1]])
-    rim = np.concatenate([alone] * 2)
+    rim = np.concatenate([border] * 2)
     pairs = pairs[rim | ~on_rim[pairs[:, 0]]]
-    near = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count)).tocsr()
-    mean = diags_array(1.0 / near.sum(axis=1)) @ near
+    links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count)).tocsr()
+    mean = diags_array(1.0 / links.sum(axis=1)) @ links
     flat = np.ascontiguousarray(offsets.transpose(1, 0, 2)).reshape(count, -1)
     for _ in range(max(1, round(SMOOTHING_SWEEPS * count / 1000))):
         flat = (1 - SMOOTHING_SHARE) * flat + SMOOTHING_SHARE * (mean @ flat)

@@ -124,7 +124,7 @@ class TrainingLoop:
         return TrainedModel(
             trainer.kind, trainer.network.cpu().eval(), trainer.recipe, seed=trainer.seed, steps=self.done,
             seconds=self.seconds + time.perf_counter() - self._started, setup_seconds=self.setup_seconds,
-            history=self.history, summary=summary, unit=trainer.how.unit, fps=1.0 / trainer.data.dt,
+            history=self.history, summary=summary, unit=trainer.spec.unit, fps=1.0 / trainer.data.dt,
             triangles=digest_of_triangles(trainer.dressed.garment.faces),
         )  # fmt: skip
 

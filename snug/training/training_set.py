@@ -40,8 +40,8 @@ class Batch:
     features: Tensor  # (N, T, D)
     rest: Tensor  # (N, 1, V, 3) or (V, 3) [m], the unposed garment
     transforms: Tensor  # (N, T, 24, 3, 4)
-    ahead: Tensor  # (N, T, 3) [m]
-    behind: Tensor  # (N, T, 3) [m]
+    lead: Tensor  # (N, T, 3) [m]
+    lag: Tensor  # (N, T, 3) [m]
     betas: Tensor | None = None  # (N, S) shape numbers, None on the mean body
 
 
@@ -81,15 +81,15 @@ class TrainingSet:
         self.names = [motion.name for motion in motions]
         self.first = np.cumsum([0, *(len(motion.poses) for motion in motions)])
         self.shapes = shapes
-        worn = list(zip(motions, [None] * len(motions) if shapes is None else shapes))
-        inputs = [dressed.features(motion, recipe, betas, feature_set=features) for motion, betas in worn]
+        pairs = list(zip(motions, [None] * len(motions) if shapes is None else shapes))
+        inputs = [dressed.features(m, recipe, betas, feature_set=features) for m, betas in pairs]
         self.features = torch.cat(inputs).to(device)
-        self.transforms = torch.cat([dressed.transforms(m.poses, betas) for m, betas in worn]).to(device)
+        self.transforms = torch.cat([dressed.transforms(m.poses, betas) for m, betas in pairs]).to(device)
         pelvises = [dressed.pelvis(motion) for motion in motions]
-        self.ahead = torch.cat([_ahead(pelvis) for pelvis in pelvises]).to(device)
+        self.lead = torch.cat([_lead(pelvis) for pelvis in pelvises]).to(device)
         # p_{t-1} - p_t of each frame, (F, 3) [m]; zero in a motion's first.
-        behind = np.concatenate([-np.diff(pelvis, axis=0, prepend=pelvis[:1]) for pelvis in pelvises])
-        self.behind = torch.as_tensor(behind, dtype=torch.float32).to(device)
+        lag = np.concatenate([-np.diff(pelvis, axis=0, prepend=pelvis[:1]) for pelvis in pelvises])
+        self.lag = torch.as_tensor(lag, dtype=torch.float32).to(device)
         self.rest = dressed.rest().to(device)
         self._rest_directions: Tensor | None = None
         body = dressed.body
@@ -157,7 +157,7 @@ class TrainingSet:
 
         The batch does not know its frames.
         """
-        parts = (self.transforms[rows], self.ahead[rows], self.behind[rows])
+        parts = (self.transforms[rows], self.lead[rows], self.lag[rows])
         batch = Batch(np.empty(0, np.int64), self.features[rows], self.rest, *parts)
         if betas is None:
             return batch
@@ -208,11 +208,11 @@ def _reposed(
     return joint_transforms(relative, joints, parents, home).float()
 
 
-def _ahead(pelvis: np.ndarray) -> Tensor:
+def _lead(pelvis: np.ndarray) -> Tensor:
     """Return 2 p_{t-1} - p_{t-2} - p_t of each frame, (T, 3) [m]; zero without two earlier frames."""
-    ahead = np.zeros_like(pelvis)
-    ahead[2:] = 2 * pelvis[1:-1] - pelvis[:-2] - pelvis[2:]
-    return torch.as_tensor(ahead, dtype=torch.float32)
+    lead = np.zeros_like(pelvis)
+    lead[2:] = 2 * pelvis[1:-1] - pelvis[:-2] - pelvis[2:]
+    return torch.as_tensor(lead, dtype=torch.float32)
 
 
 class HiddenStateCache:
@@ -224,9 +224,9 @@ class HiddenStateCache:
 
     def __init__(self, first: np.ndarray, shape: tuple[int, int], device: torch.device) -> None:
         frames = int(first[-1])
-        before = np.arange(frames) - 1
-        before[first[:-1]] = frames
-        self.before = torch.as_tensor(before, device=device)
+        past = np.arange(frames) - 1
+        past[first[:-1]] = frames
+        self.before = torch.as_tensor(past, device=device)
         self.states = torch.zeros(shape[0], frames + 1, shape[1], device=device)
 
     def at(self, frames: np.ndarray) -> Tensor:

@@ -36,16 +36,16 @@ def tables(rows: pd.DataFrame) -> dict[str, pd.DataFrame]:
     """Return name -> table, from the rows of results.csv."""
     rows = rows[(rows["suite"] == "engines") & (rows["status"] == "ok")]
     rows = rows.assign(law=rows["metric"].str.removeprefix("engine/")).set_index(["scene", "law"])
-    far = (rows["value"] - rows["expected"]).abs() > rows["tolerance"]
+    faults = (rows["value"] - rows["expected"]).abs() > rows["tolerance"]
     values = rows["value"].to_dict()
     errors = {key: 100.0 * (value - 1.0) if key[1] in RATIOS else value for key, value in values.items()}
     audit, laws = [], []
     for engine in dict.fromkeys(scene for scene, _ in values if "/" not in scene):
-        judged = {(engine, law): label for law, label in LAWS.items() if law != "spin_kept"}
-        judged[f"{engine}/x1", "distance"] = "own limit"
-        names = [label for key, label in judged.items() if far.get(key)]
-        if absent := sum(key not in values for key in judged):
-            names.append(f"{absent} not measured")
+        labels = {(engine, law): label for law, label in LAWS.items() if law != "spin_kept"}
+        labels[f"{engine}/x1", "distance"] = "own limit"
+        names = [label for key, label in labels.items() if faults.get(key)]
+        if count := sum(key not in values for key in labels):
+            names.append(f"{count} not measured")
         budget, reference = (values.get((engine, law)) for law in ("budget", "reference_time"))
         default, distance = (values.get((f"{engine}/x1", law)) for law in ("time", "distance"))
         converged = values.get((f"{engine}/x{budget or 0:.0f}", "time"))
@@ -66,9 +66,9 @@ def markdown(table: pd.DataFrame) -> str:
     | --- | --- |
     | a | 1.23 |
     """
-    known = table.astype(object).where(table.notna(), "-")
+    cells = table.astype(object).where(table.notna(), "-")
     texts = [
-        [f"{cell:.3g}" if isinstance(cell, float) else cell for cell in row] for row in known.to_numpy()
+        [f"{cell:.3g}" if isinstance(cell, float) else cell for cell in row] for row in cells.to_numpy()
     ]
     lines = [[HEADS[head] for head in table], ["---"] * len(table.columns), *texts]
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)

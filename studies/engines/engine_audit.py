@@ -148,8 +148,8 @@ def _gap(step: Step, run: RollOut) -> float:
         raise RuntimeError(
             f"energy gap: the minimum of a step is not known: {minimum.status}, {minimum.reason}"
         )
-    least = minimum.energy
-    return 100.0 * (potential.value(step.after) - least) / (potential.value(guess) - least)
+    floor = minimum.energy
+    return 100.0 * (potential.value(step.after) - floor) / (potential.value(guess) - floor)
 
 
 Answer = tuple[float | None, str]  # value and remark
@@ -242,13 +242,13 @@ def ladder(engine: str) -> tuple[dict[int, RollOut], str]:
             run = cached_roll_out(engine, "hanging", factor)
         except EngineDiverged:
             continue
-        moved = distance(runs[max(runs)], run) if runs else 100.0
+        move = distance(runs[max(runs)], run) if runs else 100.0
         runs[factor] = run
-        if moved <= STILL:
+        if move <= STILL:
             return runs, ""
     if len(runs) < 2:
         raise EngineDiverged("it diverges at all budgets but one or none")
-    return runs, f"its last two budgets differ by {moved:.2g} %, so its limit is not reached"
+    return runs, f"its last two budgets differ by {move:.2g} %, so its limit is not reached"
 
 
 @cache
@@ -272,12 +272,12 @@ def _within(runs: dict[int, RollOut]) -> int | None:
 
     None where only the largest is.
     """
-    least = None
+    result = None
     for budget in sorted(runs, reverse=True)[1:]:
         if distance(runs[budget], runs[max(runs)]) > CONVERGED:
             break
-        least = budget
-    return least
+        result = budget
+    return result
 
 
 # law -> function, specimen, unit, expected value, tolerance

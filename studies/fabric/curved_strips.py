@@ -89,7 +89,7 @@ def critical_gamma(curvature: float, stiffness_ratio: float, clamp: float = 0.0)
     values = np.array([legendre.legval(z, p) for p in polynomials])
     slopes = np.array([2 * legendre.legval(z, legendre.legder(p)) for p in polynomials])
     shape, slope = s * values, values + s * slopes
-    phi, psi = (np.kron(which, shape.T).T for which in ([[1.0, 0.0]], [[0.0, 1.0]]))
+    phi, psi = (np.kron(unit, shape.T).T for unit in ([[1.0, 0.0]], [[0.0, 1.0]]))
     tau = np.kron([[1.0, 0.0]], slope.T).T - curvature * psi
     beta = np.kron([[0.0, 1.0]], slope.T).T + curvature * phi
 

@@ -139,9 +139,9 @@ def read_fabrics(path: Path) -> tuple[Fabric, ...]:
             if field in columns:
                 raise DeclarationError(f"{path}: line 1 has two columns for {field}: leave one")
             columns[field] = (place, unit)
-    if missing := [field for field in RANGES if field not in columns]:
-        absent = ", ".join(missing)
-        raise DeclarationError(f"{path}: line 1 has no column for {absent}: its heads are {EXPECTED}")
+    if missing_fields := [field for field in RANGES if field not in columns]:
+        names = ", ".join(missing_fields)
+        raise DeclarationError(f"{path}: line 1 has no column for {names}: its heads are {EXPECTED}")
     fabrics = [
         _fabric(f"{path}: line {number}", number, line, len(lines[0]), columns)
         for number, line in enumerate(lines[1:], start=2)
@@ -153,22 +153,22 @@ def read_fabrics(path: Path) -> tuple[Fabric, ...]:
 
 
 def _fabric(
-    where: str, number: int, line: Sequence[str], heads: int, columns: dict[str, tuple[int, float]]
+    source: str, number: int, line: Sequence[str], heads: int, columns: dict[str, tuple[int, float]]
 ) -> Fabric:
     """Return the fabric of one line. Raises DeclarationError."""
     if len(line) <= max(place for place, _ in columns.values()) or any(
         cell.strip() for cell in line[heads:]
     ):
-        raise DeclarationError(f"{where}: has {len(line)} cells for {heads} heads: give it as many")
+        raise DeclarationError(f"{source}: has {len(line)} cells for {heads} heads: give it as many")
     values = {}
     for field in RANGES:
         place, unit = columns[field]
         try:
             values[field] = unit * float(line[place])
         except ValueError:
-            raise DeclarationError(f"{where}: {field} '{line[place].strip()}' is no number") from None
+            raise DeclarationError(f"{source}: {field} '{line[place].strip()}' is no number") from None
     name = plain_name(line[columns["name"][0]]) if "name" in columns else ""
-    return _in_range(where, Fabric(name or f"line_{number}", **values))
+    return _in_range(source, Fabric(name or f"line_{number}", **values))
 
 
 def _named_apart(fabrics: Sequence[Fabric]) -> tuple[Fabric, ...]:
@@ -183,12 +183,12 @@ def _named_apart(fabrics: Sequence[Fabric]) -> tuple[Fabric, ...]:
     return tuple(named.values())
 
 
-def _in_range(where: str, fabric: Fabric) -> Fabric:
+def _in_range(source: str, fabric: Fabric) -> Fabric:
     """Return the fabric. Raises DeclarationError for a number that no cloth has."""
     for field, (low, high) in RANGES.items():
         if not low <= getattr(fabric, field) <= high:
             number = f"{field} {getattr(fabric, field):g} in SI units"
-            raise DeclarationError(f"{where}: {number} is outside {low:g} to {high:g}: check its unit")
+            raise DeclarationError(f"{source}: {number} is outside {low:g} to {high:g}: check its unit")
     return fabric
 
 
@@ -206,8 +206,8 @@ def read_gauge(folder: Path) -> tuple[Fabric, ...]:
         materials = json.loads(path.read_text(encoding="utf-8"))["assets"]["textile"]["material"]
         read = {key: (float(m["density"]), float(m["bend stiffness"])) for key, m in materials.items()}
     except (OSError, KeyError, TypeError, AttributeError, ValueError) as error:
-        why = f"not the metadata of a textile task ({type(error).__name__}: {error})"
-        raise DeclarationError(f"{path}: {why}: download it again") from None
+        reason = f"not the metadata of a textile task ({type(error).__name__}: {error})"
+        raise DeclarationError(f"{path}: {reason}: download it again") from None
     return _named_apart(
         [
             _in_range(f"{path}: {key}", Fabric(plain_name(key), density, k, k))

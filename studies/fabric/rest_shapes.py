@@ -136,15 +136,15 @@ def drape(
     material = find_fabric(fabric)
     specimen = disc(material, rings, membrane_factor)
     if poisson_ratio == "zero":
-        further = [GaussianCurvature(specimen.cloth, -NU * material.rigidity)]
-        return at_rest(specimen, rate, further)
+        extras = [GaussianCurvature(specimen.cloth, -NU * material.rigidity)]
+        return at_rest(specimen, rate, extras)
     return at_rest(specimen, rate)
 
 
-def at_rest(specimen: Disc, rate: int = RATE, further: Sequence[Energy] = ()) -> float:
+def at_rest(specimen: Disc, rate: int = RATE, extras: Sequence[Energy] = ()) -> float:
     """Return the drape coefficient [%] of a specimen at rest. Raises RuntimeError where a step fails."""
     cloth = specimen.cloth
-    energies = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), *further]
+    energies = [StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), *extras]
     falling = simulate(cloth, energies, dt=1 / rate, frames=round(SECONDS * rate), start=specimen.start)
     last = demand_converged(falling, "the falling disc").positions[-1]
     settling = simulate(cloth, energies, dt=1 / RATE, frames=SETTLING, start=last, quasi_static=True)

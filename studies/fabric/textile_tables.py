@@ -89,7 +89,7 @@ def order_table(rows: pd.DataFrame) -> pd.DataFrame:
 
 
 def order(
-    mine: Mapping[str, float] | pd.Series, reference: Mapping[str, float] | pd.Series, apart: float
+    readings: Mapping[str, float] | pd.Series, reference: Mapping[str, float] | pd.Series, gap: float
 ) -> tuple[list[tuple[str, str]], int]:
     """Compare the order of a method's readings with that of the reference's, by fabric.
 
@@ -97,17 +97,17 @@ def order(
         Pairs that stand the other way round than by the reference, the worst first, (lower, higher) by
         the reference; and the number of pairs that the reference tells apart and the method has.
 
-    >>> order({"a": 3.0, "b": 2.0}, {"a": 1.0, "b": 9.0}, apart=1.0)
+    >>> order({"a": 3.0, "b": 2.0}, {"a": 1.0, "b": 9.0}, gap=1.0)
     ([('a', 'b')], 1)
     """
     pairs, turned = 0, []
-    for pair in combinations([name for name in dict(reference) if name in mine], 2):
+    for pair in combinations([name for name in dict(reference) if name in readings], 2):
         low, high = sorted(pair, key=lambda name: reference[name])
-        if reference[high] - reference[low] < apart:
+        if reference[high] - reference[low] < gap:
             continue
         pairs += 1
-        if mine[low] > mine[high]:
-            turned.append((mine[low] - mine[high], (low, high)))
+        if readings[low] > readings[high]:
+            turned.append((readings[low] - readings[high], (low, high)))
     return [pair for _, pair in sorted(turned, reverse=True)], pairs
 
 

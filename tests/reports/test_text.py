@@ -28,7 +28,7 @@ RUN = run_of([row("a/b", "snug", "energy/total")])
 
 def small_table() -> Table:
     effect = Effect(value=1.5, scale=EXCESS, second=0.0, error=0.2, motions=20)
-    mean = Mean(value=0.25, spread=0.01, seeds=3, asked=0)
+    mean = Mean(value=0.25, spread=0.01, seeds=3, full_count=0)
     excess, total = Column("excess", "Excess", "%"), Column("total", "Total", "J")
     columns = METHOD, excess, total, Column("none", "None")
     return Table("t", columns, (("snug", effect, mean, None), ("skinning", None, None, None)))

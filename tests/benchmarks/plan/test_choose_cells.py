@@ -68,7 +68,7 @@ def test_patterns_choose_scenes_methods_and_cases():
 
 
 def test_places_of_a_pattern_are_filled_by_motions_of_the_split():
-    motions = Motions(("walk",), ("kick", "punch"), worn=GARMENT_SCENES[:3])
+    motions = Motions(("walk",), ("kick", "punch"), garments=GARMENT_SCENES[:3])
     names = expanded(["{garment}/{motion}", "tunic/{motion}", "tshirt/{motion 2}@clip", "flag"], motions)
     swinging = [f"tunic/{motion}" for motion in DYNAMIC_TEST]
     assert names == ["tshirt/kick", "tshirt/punch", *swinging, "tshirt/punch@clip", "flag"]

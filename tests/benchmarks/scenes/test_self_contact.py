@@ -78,7 +78,7 @@ def test_the_option_makes_it_the_ground_truth_of_dressed_scenes(monkeypatch):
     )
     plan = make_plan(study)
     assert {s.name: s.self_contact for s in plan.scenes} == {"tshirt/kick": True, "flag": False}
-    learned_from = of_garment("tshirt", plan.motions.worn).scene("walk")
+    learned_from = of_garment("tshirt", plan.motions.garments).scene("walk")
     assert learned_from.self_contact
     of_kick, *_ = (cell for cell in plan.cells if cell.scene.dressed and cell.method == "simulation")
     assert protocol_of(of_kick, plan) == OWN  # another reference than that of the protocol

@@ -23,7 +23,7 @@ def column(table, name):
 def test_mean_and_spread_over_seeds():
     rows = [row(scene, seed=s, value=v) for scene in SCENES for s, v in ((0, 1.0), (1, 3.0), (2, 8.0))]
     mean = mean_of(run_of(rows).frame, "snug", "energy/strain")
-    assert mean == Mean(4.0, pytest.approx(np.std([1, 3, 8], ddof=1)), seeds=3, asked=6)
+    assert mean == Mean(4.0, pytest.approx(np.std([1, 3, 8], ddof=1)), seeds=3, full_count=6)
     assert dict(mean.cells) == {(scene, s): v for scene in SCENES for s, v in enumerate((1.0, 3.0, 8.0))}
     assert mean_of(run_of(rows[:1]).frame, "snug", "energy/strain").spread is None
     equal = [row(seed=seed, value=2.679144) for seed in range(3)]  # whose mean is another number

@@ -51,7 +51,7 @@ def test_what_is_no_number_or_not_trusted_moves_no_anchor(kernels):
     posed = contact.bodies.posed(batch)
     x = skin(batch.rest, trainer.weights, batch.transforms) - torch.tensor([0.0, 0.0, 0.08])
     for vertices, trusted, moved in ((torch.nan * x, True, False), (x, False, False), (x, True, True)):
-        trainer.loss(vertices, batch.ahead, contact.planes(batch, posed, vertices))
+        trainer.loss(vertices, batch.lead, contact.planes(batch, posed, vertices))
         assert all(kept()) == (vertices is not x)
         contact.settle(batch.frames, trusted=trusted)
         assert all(kept()) == (not moved)
@@ -165,7 +165,7 @@ def test_planes_at_nearest_vertices_are_those_of_brute_force():
     assert (depth > 0).sum() > 20
     for trainer in trainers:
         trainer.step(0)
-        energy = trainer.loss(x, batch.ahead, trainer.nearest.planes(batch, x))["collision"]
+        energy = trainer.loss(x, batch.lead, trainer.nearest.planes(batch, x))["collision"]
         (slope,) = torch.autograd.grad(energy.sum(), x)
         assert np.allclose(energy.detach()[0], energies, rtol=1e-3)
         assert np.allclose(slope[0], gradient, rtol=1e-2, atol=1e-3 * np.abs(gradient).max())

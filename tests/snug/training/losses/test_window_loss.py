@@ -104,7 +104,7 @@ def loss_of(recipe: Recipe, *, copies: int, kernels: bool, frames: int) -> tuple
     given = torch.as_tensor(x).repeat_interleave(copies, 0).requires_grad_()
     steps = (torch.as_tensor(np.repeat(a, copies, 0)).float() for a in (ahead, behind))
     loss = PhysicsLoss(dressed.cloth, recipe, dt=DT, kernels=kernels)
-    terms = loss(given, next(steps), planes, behind=next(steps))
+    terms = loss(given, next(steps), planes, lag=next(steps))
     total = sum(energy.mean() for energy in terms.values())
     total.backward()
     return total.item(), given.grad * copies
