@@ -117,7 +117,7 @@ class Assets:
     motions: dict[str, Motion]
     clips: dict[str, range]
 
-    def named(self, names: Iterable[str]) -> list[Motion]:
+    def pick(self, names: Iterable[str]) -> list[Motion]:
         """Return the motions of those names, in that order."""
         return [self.motions[name] for name in names]
 
@@ -129,7 +129,7 @@ class Assets:
         frames = self.clips[name]
         return replace(whole.cut(frames.start, frames.stop), name=f"{name}@clip")
 
-    def before(self, name: str, part: str) -> Motion | None:
+    def cut_before(self, name: str, part: str) -> Motion | None:
         """Return the motion before that part; None where the part begins with the motion."""
         start = self.clips[name].start if part == "clip" else 0
         return self.motions[name].cut(0, start) if start else None
@@ -155,7 +155,7 @@ def open_assets(
     Those named in `training` have another length. Garments in `ready` are not tailored. Raises ValueError
     for one that cannot be.
 
-    >>> assets = open_assets(find_preset("smoke"), embedded_motions(["walk"]), ["tshirt"])  # doctest: +SKIP
+    >>> assets = open_assets(find_preset("smoke"), make_motions(["walk"]), ["tshirt"])  # doctest: +SKIP
     """
     inputs = inputs or Inputs()
     wearer, file = inputs.wearer, inputs.garment
@@ -176,10 +176,10 @@ def open_assets(
     return Assets(wearer, tailored, {motion.name: motion for motion in cuts}, clips)
 
 
-def embedded_motions(names: Iterable[str]) -> list[Motion]:
+def make_motions(names: Iterable[str]) -> list[Motion]:
     """Make motions of the embedded library.
 
-    >>> [motion.frames for motion in embedded_motions(["walk"])]
+    >>> [motion.frames for motion in make_motions(["walk"])]
     [120]
     """
     from snug.motion.library import make_motion

@@ -18,7 +18,7 @@ from benchmarks.declarations import DeclarationError, raised_at
 from benchmarks.method import Method, MethodEntry
 from benchmarks.plan import user_files
 from benchmarks.plan.cell import Cell
-from benchmarks.plan.options import add_study_options, study_of
+from benchmarks.plan.options import add_options, study_of
 from benchmarks.plan.plan import Plan, make_plan
 from benchmarks.plan.study import Part, Study
 from benchmarks.presets import find_preset
@@ -76,7 +76,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--scene", metavar="SCENE", dest="scenes", action="append", default=[],
         help="check the methods in this scene of benchmarks.run --list, in place of the tiny ones: for "
         "networks that are bound to a garment or a mesh")  # fmt: skip
-    add_study_options(parser)
+    add_options(parser)
     options = parser.parse_args(arguments)
     faults = 0
     study = study_of(options)
@@ -125,7 +125,7 @@ def faults_of(plan: Plan) -> Iterator[tuple[str, str]]:
     if not cells:
         return
     run = RunFolder(plan.folder)
-    runner = Runner([checked(task) for task in tasks_of(replace(plan, cells=cells))], Cache(run))
+    runner = Runner([make_check(task) for task in tasks_of(replace(plan, cells=cells))], Cache(run))
     runner.run(Executor(run, plan.open_assets() if plan.garments else None, plan.workers))
     for cell in cells:
         ids = (cell.id(), cell.id("batch"), cell.id("metrics"))
@@ -158,7 +158,7 @@ def run_checked(cell: Cell, min_time: float, context: Context, needed: Needed) -
     return outcome
 
 
-def checked(task: Task) -> Task:
+def make_check(task: Task) -> Task:
     """Return the task that checks what it runs in place of one that runs a cell."""
     assert isinstance(task.run, partial)
     return replace(task, run=partial(run_checked, *task.run.args)) if task.kind == "cell" else task

@@ -65,7 +65,7 @@ def load(module: str) -> ModuleType:
     if str(path.parent) not in sys.path:
         sys.path.append(str(path.parent))
     importlib.invalidate_caches()  # it may have been written a moment ago
-    demand_that_it_is(path.stem, path)
+    demand_import(path.stem, path)
     return importlib.import_module(path.stem)
 
 
@@ -84,7 +84,7 @@ def raised_at(error: BaseException, home: str) -> str:
     return f"{frames[-1].filename}: line {frames[-1].lineno}" if frames else ""
 
 
-def demand_that_it_is(name: str, path: Path) -> None:
+def demand_import(name: str, path: Path) -> None:
     """Raise DeclarationError unless the module of that name is imported from that file."""
     spec = importlib.util.find_spec(name) if name.replace(".", "_").isidentifier() else None
     if not (spec and spec.origin and Path(spec.origin).is_file() and path.samefile(spec.origin)):

@@ -16,16 +16,16 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.assets import Assets, embedded_motions, open_assets
+from benchmarks.assets import Assets, make_motions, open_assets
 from benchmarks.external.roll_out_files import MODULE
 from benchmarks.metric import RollOut
 from benchmarks.metrics.energy_gap import gap_scale, judge_steps
 from benchmarks.plan.cell import Cell, TaskId, id_of
 from benchmarks.plan.plan import Plan, runs
 from benchmarks.provenance import digest_of_file
-from benchmarks.references import TRAINED, Reference, find_reference, packaged_network, shipped_garment
+from benchmarks.references import TRAINED, Reference, find_in_package, find_reference, load_garment
 from benchmarks.results.run_folder import RunFolder, model_path
-from benchmarks.runner.cells import prepared_method, run_cell
+from benchmarks.runner.cells import prepare_method, run_cell
 from benchmarks.runner.ground_truth import simulate_quasi_static
 from benchmarks.runner.measurements import measure_cell, roll_outs_of
 from benchmarks.runner.rows import rows_of
@@ -60,7 +60,7 @@ def evaluate(plan: Plan, references: Mapping[str, Reference] | None = None) -> R
             notes += [f"{shipped}: it is simulated, which takes minutes"] * (scene in simulated)
             continue
         by_scene[scene.name] = shipped
-        if any(digest_of_file(packaged_network(name)) != at for name, at in shipped.networks.items()):
+        if any(digest_of_file(find_in_package(name)) != at for name, at in shipped.networks.items()):
             notes.append(OLDER)
     cells = (c for c in plan.cells if c.method not in TRAINED or c.scene.name in by_scene)
     plan = replace(plan, cells=tuple(replace(c, entry=replace(c.entry, timed=False)) for c in cells))
@@ -69,13 +69,13 @@ def evaluate(plan: Plan, references: Mapping[str, Reference] | None = None) -> R
         memo["scene"] = replace(memo["scene"], settle=lambda start=start: start)
     for cell in plan.cells:
         if cell.entry.module == MODULE:
-            prepared_method(cell, contexts[cell.scene.name])
+            prepare_method(cell, contexts[cell.scene.name])
     print(*dict.fromkeys(notes), sep="\n", end="\n" * bool(notes), file=sys.stderr)
     log, outcomes = RunLog(plan), dict[TaskId, Outcome]()
     if assets:
         log.open_assets(assets)
     for scene in plan.scenes:
-        outcomes |= _of_scene(scene, plan, contexts[scene.name], by_scene.get(scene.name))
+        outcomes |= _run_scene(scene, plan, contexts[scene.name], by_scene.get(scene.name))
     log.config["finished"] = now()
     outcomes = {id: replace(o, origin=log.origin | o.origin) for id, o in outcomes.items()}
     log.write_rows(rows_of(plan, (), outcomes))
@@ -86,14 +86,14 @@ def assets_of(plan: Plan) -> Assets | None:
     """Open body, garments and the motions of the scenes alone; None without a dressed scene."""
     read = plan.inputs.motions
     names = dict.fromkeys(scene.motion for scene in plan.scenes if scene.dressed)
-    motions = [read[name] if name in read else embedded_motions([name])[0] for name in names]
+    motions = [read[name] if name in read else make_motions([name])[0] for name in names]
     if not names:
         return None
-    sizes, ready = plan.study.sizes, shipped_garment(plan)
+    sizes, ready = plan.study.sizes, load_garment(plan)
     return open_assets(sizes, motions, plan.garments, inputs=plan.inputs, ready=ready)
 
 
-def _of_scene(
+def _run_scene(
     scene: Scene, plan: Plan, context: Context, reference: Reference | None
 ) -> dict[TaskId, Outcome]:
     """Return the outcomes of a scene's cells and of their metrics."""
@@ -104,13 +104,13 @@ def _of_scene(
         if (reason := cell.entry.skip(scene)) is not None:
             outcomes[cell.id()] = Outcome("skipped", reason)
         elif reference and cell.entry.role == "reference":
-            outcomes[cell.id()] = _saved(reference, cell, context)
+            outcomes[cell.id()] = _save(reference, cell, context)
         elif cell.method not in metrics:
             if cell.entry.trained in TRAINED:
                 models = context.folder.models_of(scene.garment)
                 models.mkdir(parents=True, exist_ok=True)
                 copy = model_path(models, cell.entry.trained, cell.seed)
-                shutil.copyfile(packaged_network(cell.entry.trained), copy)
+                shutil.copyfile(find_in_package(cell.entry.trained), copy)
             outcomes[cell.id()] = run_cell(cell, 0.0, context, {})
     simulated = any(cell.entry.role == "reference" and runs(cell) for cell in cells)
     if scene.dynamic and simulated:
@@ -130,7 +130,7 @@ def _of_scene(
     return outcomes | measured
 
 
-def _saved(reference: Reference, cell: Cell, context: Context) -> Outcome:
+def _save(reference: Reference, cell: Cell, context: Context) -> Outcome:
     """Write a reference into the run's folder, as if simulated there."""
     built, folder = context.memo["scene"], context.folder
     static = np.full_like(reference.positions, np.nan)
@@ -155,21 +155,21 @@ def _steps_beside(roll_out: RollOut) -> Iterator[None]:
     fork: Any = get_context("fork")  # what the process needs is there, and nothing is loaded again
     _remembered[:] = [roll_out]
     with ProcessPoolExecutor(1, fork) as pool:
-        roll_out.group.keep(gap_scale, pool.submit(_remembered_scale))
-        roll_out.keep(judge_steps, pool.submit(_remembered_steps))
+        roll_out.group.keep(gap_scale, pool.submit(_recall_scale))
+        roll_out.keep(judge_steps, pool.submit(_recall_steps))
         yield
 
 
 _remembered: list[RollOut] = []
 
 
-def _remembered_steps() -> Any:
-    return _remembered[0].kept(judge_steps)
+def _recall_steps() -> Any:
+    return _remembered[0].get(judge_steps)
 
 
-def _remembered_scale() -> Any:
+def _recall_scale() -> Any:
     roll_out = _remembered[0]
     # Where no kernel is compiled yet, the other process compiles the search for contact planes meanwhile.
     if smooth := [term for term in roll_out.scene.energies if term.name in SMOOTH]:
         Potential(smooth).hessian(roll_out.positions[0])
-    return roll_out.group.kept(gap_scale)
+    return roll_out.group.get(gap_scale)

@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.methods import find_method
-from benchmarks.plan.options import add_study_options, study_of
+from benchmarks.plan.options import add_options, study_of
 from benchmarks.plan.plan import make_plan
 from benchmarks.plan.study import StudyError
 from benchmarks.timing import one_thread
@@ -48,7 +48,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     add("--reference", action="store_true", help="simulate the scene, and write the trajectory too")
     add("--for", dest="reader", choices=("hood", "contourcraft", "ncs"), default="",
         help="write what the public code of that method reads, too")  # fmt: skip
-    add_study_options(parser)
+    add_options(parser)
     options = parser.parse_args(arguments)
     folder = Path(options.out)
     garment, _, motion = options.scene.rpartition("/")

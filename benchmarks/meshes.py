@@ -136,7 +136,7 @@ def rectangle(
     if family == "union_jack":
         return points, _alternate(rows, columns)
     if family == "cross":
-        return _crossed(points, rows, columns)
+        return _cross(points, rows, columns)
     if family == "equilateral":
         points = np.concatenate([_column(i, rows) for i in range(columns + 1)]) * cell
     elif family == "delaunay":
@@ -176,7 +176,7 @@ def _alternate(rows: int, columns: int) -> np.ndarray:
     return np.concatenate([first, second])
 
 
-def _crossed(points: np.ndarray, rows: int, columns: int) -> tuple[np.ndarray, np.ndarray]:
+def _cross(points: np.ndarray, rows: int, columns: int) -> tuple[np.ndarray, np.ndarray]:
     corners = _corners(rows, columns)
     middle = len(points) + np.arange(rows * columns)
     centres = sum(points[corner] for corner in corners) / 4

@@ -216,7 +216,7 @@ class MethodEntry:
             roles = ", ".join(filter(None, ROLES))
             raise DeclarationError(f"method {self.name}: unknown role '{self.role}'; use one of {roles}")
 
-    def meant_for(self, scene: Scene) -> bool:
+    def is_meant_for(self, scene: Scene) -> bool:
         """Return whether method and scene may meet: some scenes are for networks alone, some for none."""
         if scene.networks_only:
             return self.batched
@@ -230,7 +230,7 @@ class MethodEntry:
             return f"{self.name} moves a garment with a body's joints; this scene has no body"
         if self.needs_no_obstacle and (scene.dressed or scene.obstacle):
             return f"{self.name} is compared without contact, where its energies and ours are alike"
-        if self.package is not None and not installed(self.package):
+        if self.package is not None and not is_installed(self.package):
             return f"{self.name} needs the package {self.package}, which is not installed"
         return None
 
@@ -241,7 +241,7 @@ class MethodEntry:
         return load_function(self.module, "make")(models=models, seed=seed, **self.options)
 
 
-def installed(package: str) -> bool:
+def is_installed(package: str) -> bool:
     """Return whether a package can be imported; a mere folder of that name cannot."""
     spec = importlib.util.find_spec(package)
     return spec is not None and spec.origin is not None

@@ -150,7 +150,7 @@ class Kept:
 
     _made: dict[Callable[..., Any], Any] = field(default_factory=dict, init=False, repr=False)
 
-    def kept(self, make: Callable[[Any], Made]) -> Made:
+    def get(self, make: Callable[[Any], Made]) -> Made:
         """Return make(self), computed at the first call."""
         if make not in self._made:
             self._made[make] = make(self)
@@ -204,7 +204,7 @@ class RollOut(Kept):
         """Frames after those of the warm-up."""
         return slice(self.scene.warm_up, None)
 
-    def judged_beside(self, other: np.ndarray) -> slice:
+    def match_frames(self, other: np.ndarray) -> slice:
         """Return the frames after the warm-up that positions (T',V,3) [m] of another roll-out have too."""
         return slice(self.scene.warm_up, min(len(self.positions), len(other)))
 

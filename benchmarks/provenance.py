@@ -167,10 +167,10 @@ def software(*places: str) -> dict[str, str]:
     >>> list(software("benchmarks/declarations.py"))[:2]
     ['benchmarks/declarations.py', 'package numpy']
     """
-    outermost = sorted(p for p in set(places) if not any(p.startswith(f"{other}/") for other in places))
-    parts = {place: _content(place) for place in outermost}
+    outer = sorted(p for p in set(places) if not any(p.startswith(f"{other}/") for other in places))
+    parts = {place: _content(place) for place in outer}
     parts |= {f"package {name}": version for name, version in versions().items()}
-    return parts | ({"installed packages": _installed()} if any(map(os.path.isabs, outermost)) else {})
+    return parts | ({"installed packages": _digest_packages()} if any(map(os.path.isabs, outer)) else {})
 
 
 def find_module(module: str) -> str:
@@ -195,7 +195,7 @@ def find_module(module: str) -> str:
     return spec.origin
 
 
-def imported_beside(home: str) -> dict[str, Path]:
+def find_imports(home: str) -> dict[str, Path]:
     """Return name -> file of the modules and packages beside a user's file that it or one of them imports."""
     top, names = _top_of(Path(home)), set[str]()
     for path in _neighbours(Path(home)):
@@ -261,5 +261,5 @@ def _top_of(home: Path) -> Path:
 
 
 @cache
-def _installed() -> str:
+def _digest_packages() -> str:
     return digest(sorted(f"{package.name} {package.version}" for package in metadata.distributions()))

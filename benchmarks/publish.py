@@ -17,7 +17,7 @@ from benchmarks.plan.study import Show, Study, StudyError, option, read_study, s
 from benchmarks.provenance import commit, digest_of_file
 from benchmarks.results.row import USABLE, ResultsError
 from benchmarks.results.run_folder import RunFolder, model_path
-from benchmarks.runner.execute_plan import accepted, describe
+from benchmarks.runner.execute_plan import describe, is_accepted
 from benchmarks.timing import one_thread
 from reference_sim.command_line import Parser, command
 from reference_sim.files.atomic_files import new_folder
@@ -123,7 +123,7 @@ def make_reference(name: str, out: Path) -> Path:
         if row.value is not None:
             metrics[row.method][row.metric] = row.value
     networks = {
-        method: digest_of_file(references.packaged_network(method)) for method in references.TRAINED
+        method: digest_of_file(references.find_in_package(method)) for method in references.TRAINED
     }
     reference = replace(reference, metrics=metrics, origin=log.origin, networks=networks)
     return references.write_reference(scene, plan, reference, built)
@@ -182,7 +182,7 @@ def all_usable(folder: RunFolder) -> bool:
         return False
     config = folder.read_config()
     failed = ("failed" in facts for kind in config.get("tasks", {}).values() for facts in kind.values())
-    counted = (accepted(row) or row.status in USABLE for row in folder.read_rows())
+    counted = (is_accepted(row) or row.status in USABLE for row in folder.read_rows())
     return bool(config.get("finished")) and all(counted) and not any(failed)
 
 

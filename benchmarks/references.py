@@ -19,7 +19,7 @@ from benchmarks.plan.cell import flat
 from benchmarks.plan.plan import Plan, protocol_of
 from benchmarks.provenance import digest
 from benchmarks.results.protocol import DIGESTS, OWN
-from benchmarks.runner.schedule import declared
+from benchmarks.runner.schedule import read_entry
 from benchmarks.scene import Scene
 from reference_sim.files.array_file import read_arrays
 from reference_sim.files.atomic_files import replacing
@@ -67,12 +67,12 @@ class Reference:
     networks: Mapping[str, str] = field(default_factory=dict)
 
 
-def packaged_network(method: str) -> Path:
+def find_in_package(method: str) -> Path:
     """Return the file of the package's network for the T-shirt."""
     return NETWORKS / f"{network_name(method, TSHIRT, 0)}{SUFFIX}"
 
 
-def shipped_garment(plan: Plan) -> dict[str, Garment]:
+def load_garment(plan: Plan) -> dict[str, Garment]:
     """Return the T-shirt by its name, as it is tailored to the package's body; empty for another one."""
     if plan.inputs.body or plan.study.sizes.garment_vertices != VERTICES or not GARMENT.is_file():
         return {}
@@ -82,7 +82,7 @@ def shipped_garment(plan: Plan) -> dict[str, Garment]:
 
 
 def write_garment(garment: Garment) -> None:
-    """Write the file that `shipped_garment` reads."""
+    """Write the file that `load_garment` reads."""
     names = ("rest_positions", "faces", "body_vertices", "skinning_weights")
     arrays: dict[str, Any] = {name: getattr(garment, name) for name in names}
     loops = {f"{LOOP}{name}": loop for name, loop in garment.loops.items()}
@@ -91,7 +91,7 @@ def write_garment(garment: Garment) -> None:
 
 def key_of(scene: Scene, plan: Plan, built: BuiltScene) -> str:
     """Return the digest of what the numbers of a scene depend on, but for code and motion."""
-    sizes, declaration = plan.study.sizes, declared(scene) | {"faces": digest(built.cloth.faces)}
+    sizes, declaration = plan.study.sizes, read_entry(scene) | {"faces": digest(built.cloth.faces)}
     del declaration["metrics"]
     parts = [DIGESTS[name] for name in PARTS]
     return digest([declaration, sizes.garment_vertices, sizes.frames, sizes.gap_samples, parts])
@@ -116,7 +116,7 @@ def find_reference(scene: Scene, plan: Plan, built: BuiltScene) -> Reference | s
     same = moved.shape == motion.shape and np.allclose(moved, motion, rtol=0.0, atol=SAME)
     if facts.pop("key") != key_of(scene, plan, built) or not same:
         return f"{path.name} is of another scene, motion or protocol"
-    moves, hem_moves = (_unpacked(arrays[name]) for name in ("positions", "hem"))
+    moves, hem_moves = (_unpack(arrays[name]) for name in ("positions", "hem"))
     order, parents = _tree(built.cloth.faces)
     for vertex in order[1:]:
         moves[:, vertex] += moves[:, parents[vertex]]
@@ -136,7 +136,7 @@ def write_reference(scene: Scene, plan: Plan, reference: Reference, built: Built
     path = FOLDER / f"{flat(scene.name)}.npz"
     with replacing(path) as temporary, temporary.open("wb") as stream:
         np.savez_compressed(
-            stream, positions=_packed(deltas), hem=_packed(hem), facts=np.array(json.dumps(facts)),
+            stream, positions=_pack(deltas), hem=_pack(hem), facts=np.array(json.dumps(facts)),
             motion=motion_of(built).astype(np.float32),
         )  # fmt: skip
     return path
@@ -152,12 +152,12 @@ def _tree(faces: Faces) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     return breadth_first_order(graph, 0, directed=False)
 
 
-def _packed(numbers: NDArray[np.int64]) -> NDArray[np.uint8]:
+def _pack(numbers: NDArray[np.int64]) -> NDArray[np.uint8]:
     """Return whole numbers as bytes (4,...), signs in the lowest bit: the upper bytes are mostly 0."""
     moved = ((numbers << 1) ^ (numbers >> 63)).astype("<u4")
     return np.moveaxis(moved[..., None].view(np.uint8), -1, 0)
 
 
-def _unpacked(packed: NDArray[np.uint8]) -> NDArray[np.int64]:
+def _unpack(packed: NDArray[np.uint8]) -> NDArray[np.int64]:
     whole = np.ascontiguousarray(np.moveaxis(packed, 0, -1)).view("<u4")[..., 0].astype(np.int64)
     return (whole >> 1) ^ -(whole & 1)

@@ -15,18 +15,18 @@ from benchmarks.declarations import DeclarationError
 from benchmarks.external.roll_out_files import RollOutFileError
 from benchmarks.plan.options import PROGRAM, list_names, make_parser, study_of
 from benchmarks.plan.plan import Plan, make_plan
-from benchmarks.plan.study import StudyError, located
+from benchmarks.plan.study import StudyError, locate
 from benchmarks.runner.task import RunRefused, RunStopped
 from benchmarks.timing import one_thread
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
-    command_line = list(sys.argv[1:] if arguments is None else arguments)
+    typed = list(sys.argv[1:] if arguments is None else arguments)
     name = "default"
     one_thread()
     try:
-        options = make_parser().parse_args(command_line)
+        options = make_parser().parse_args(typed)
         name = options.study
         study = study_of(options, name)
         if options.list is not None:
@@ -39,11 +39,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
             fresh=options.fresh,
             workers=options.workers,
             scheduler=options.scheduler or "",
-            command=shlex.join(["python", "-m", PROGRAM, *command_line]),
+            command=shlex.join(["python", "-m", PROGRAM, *typed]),
         )
     except (ValueError, OSError) as error:  # also the readers' own: each is one line with file and remedy
         line = " ".join(str(error).split())
-        line = located(line, name, command_line) if isinstance(error, StudyError) else line
+        line = locate(line, name, typed) if isinstance(error, StudyError) else line
         print(f"{PROGRAM}: {line}", file=sys.stderr)
         return 2
     except KeyboardInterrupt:

@@ -207,7 +207,7 @@ class BuiltScene:
         if frames is not None:
             motion = replace(motion, poses=motion.poses[frames], translations=motion.translations[frames])
         dressed = DressedBody(self.dressed.body, self.dressed.garment)
-        return dressed.skinned(motion, self.dressed.betas, smoothing=DEFAULT.smoothing)
+        return dressed.skin(motion, self.dressed.betas, smoothing=DEFAULT.smoothing)
 
     @property
     def simulated_energies(self) -> tuple[Energy, ...]:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from benchmarks.external.roll_out_files import RollOutFileError, RollOutOption, parse_roll_out
 from benchmarks.plan.cell import Cell
-from benchmarks.plan.options import add_study_options, study_of
+from benchmarks.plan.options import add_options, study_of
 from benchmarks.plan.plan import Plan, make_plan
 from benchmarks.plan.study import Study, StudyError, option, read_study
 from benchmarks.timing import one_thread
@@ -53,7 +53,7 @@ exit status: 0 scored; 1 something failed, a line says what; 2 the roll-out cann
 @command(PROGRAM)
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
-    command_line = list(sys.argv[1:] if arguments is None else arguments)
+    typed = list(sys.argv[1:] if arguments is None else arguments)
     parser = Parser(
         prog=f"python -m {PROGRAM}",
         description="Energies, gap to the minimum of each step, curvature, depth, dynamics of "
@@ -67,7 +67,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     group.add_argument("--rest-mesh", metavar="FILE",
         help="no scene of this project: the cloth at rest, in the roll-out's unit, axes and order; the file "
         "brings its own body (obstacle, obstacle_faces) and starts at rest in its first frame")  # fmt: skip
-    add_study_options(parser)
+    add_options(parser)
     reference = parser.add_mutually_exclusive_group()
     reference.add_argument("--reference", metavar="FILE",
         help="compare with this roll-out (metres, y up) instead of the simulation")  # fmt: skip
@@ -77,12 +77,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         help="simulate the scene, also where its reference is shipped")  # fmt: skip
     add("-o", "--out", metavar="DIR", help="folder of the rows (default: a new one under reports/runs/)")
     parser.set_defaults(reference=None)
-    options = parser.parse_args(command_line)
+    options = parser.parse_args(typed)
     scored = score(
         options.roll_out, options.scene or "", study=study_of(options), rest_mesh=options.rest_mesh,
         reference=options.reference, fresh=options.fresh,
         folder=Path(options.out) if options.out else None,
-        command_line=shlex.join(["python", "-m", PROGRAM, *command_line]),
+        command_line=shlex.join(["python", "-m", PROGRAM, *typed]),
     )  # fmt: skip
     from reports.build import build_row
 
@@ -138,9 +138,9 @@ def plan_score(
         raise RollOutFileError("other-mesh compares with a scene: give --scene, not --rest-mesh")
     scenes = []
     if rest_mesh:
-        from benchmarks.scenes.from_roll_out import declared  # loads the simulator
+        from benchmarks.scenes.from_roll_out import declare_scene  # loads the simulator
 
-        scenes = [declared(stored, str(rest_mesh))]
+        scenes = [declare_scene(stored, str(rest_mesh))]
         scene = scenes[0].name
     methods = MEASURED_BESIDE if rest_mesh else (*MEASURED_BESIDE, *NETWORKS)
     # Some have a scene's name.

@@ -32,7 +32,7 @@ from benchmarks.score import MEASURED_BESIDE
 from benchmarks.timing import one_thread
 from reference_sim.command_line import Parser, command
 from reference_sim.files.array_file import read_arrays
-from reference_sim.given_files import regular
+from reference_sim.given_files import demand_file
 from snug.motion.library import TEST
 
 if TYPE_CHECKING:
@@ -179,7 +179,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
             if path := entry.metadata.roll_outs:
                 files = {name: entry.path / path.replace(PLACE, name) for name in map(flat, entry.scenes)}
                 find_copies(
-                    entry, {f"{n}-seed0": sampled(read_roll_out(f).positions) for n, f in files.items()}
+                    entry, {f"{n}-seed0": sample(read_roll_out(f).positions) for n, f in files.items()}
                 )
             print(f"{entry.path}: nothing found; {len(entry.scenes)} of {len(SCENES)} scenes")
             return 0
@@ -201,7 +201,7 @@ def read_entry(path: Path) -> Entry:
         if not Path(os.path.realpath(file)).is_relative_to(path.resolve()):
             raise EntryError(f"{file}: is a link out of the entry's folder: put the file itself there")
         if not file.is_dir():
-            regular(file)
+            demand_file(file)
     return Entry(path, read_fields(Metadata, path / METADATA))
 
 
@@ -243,7 +243,7 @@ def write_scores(entry: Entry, run: RunFolder) -> int:
         f"{flat(scene)}-seed{seed}": Trajectory.load(run.trajectory_path(scene, method, seed)).positions
         for scene, method, seed in cells
     }
-    samples: dict[str, Any] = {name: sampled(positions) for name, positions in frames.items()}
+    samples: dict[str, Any] = {name: sample(positions) for name, positions in frames.items()}
     find_copies(entry, samples)
     config, folder = run.read_config(), entry.scores
     folder.write_rows(rows)
@@ -258,7 +258,7 @@ def write_scores(entry: Entry, run: RunFolder) -> int:
     return len(rows)
 
 
-def sampled(positions: Positions) -> Floats:
+def sample(positions: Positions) -> Floats:
     """Return some vertices of each frame about their centre, (T,N) [m]."""
     few = positions[:, :: max(positions.shape[1] // VERTICES, 1)]
     return (few - few.mean(axis=1, keepdims=True)).reshape(len(few), -1).astype(np.float32)

@@ -62,7 +62,7 @@ def one_thread() -> None:
         os.environ[name] = "1"
 
 
-def clocked(
+def time_run(
     run: Callable[[], Made], *, read: Callable[[Made], np.ndarray], min_time: float = 0.0
 ) -> tuple[Made, Reading]:
     """Return the result of run(), and the time until all positions `read` from it are there.
@@ -100,7 +100,7 @@ def clocked(
         crowd = f"{used:.2f} s of processor time in {seconds:.2f} s: more than one thread has worked: "
         crowd += "leave the number of threads alone: one is set, see OMP_NUM_THREADS"
         return result, Reading(tuple(runs), crowd)
-    late = _still_at_work(read(result), before, children)
+    late = _watch_process(read(result), before, children)
     late += ": wait in run() for all threads, processes and devices; leave none behind" if late else ""
     return result, Reading(tuple(runs), late)
 
@@ -117,7 +117,7 @@ def _compilations() -> Iterator[list[object]]:
         yield recorder.buffer
 
 
-def _still_at_work(
+def _watch_process(
     positions: np.ndarray,
     threads: set[threading.Thread],
     children: set[multiprocessing.process.BaseProcess],

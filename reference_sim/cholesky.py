@@ -130,7 +130,7 @@ class ScalarPattern:
         self._keys = moved[rows, 1] * count + moved[rows, 0]
         self.row_columns = np.ascontiguousarray(moved[rows, 0])
         self.row_starts = np.searchsorted(moved[rows, 1], np.arange(count + 1))
-        self.factor_rows, self.factor_columns = _pattern_of_rows(self.row_starts, self.row_columns)
+        self.factor_rows, self.factor_columns = _find_rows(self.row_starts, self.row_columns)
         by_rows = (np.ones(len(self.factor_columns)), self.factor_columns, self.factor_rows)
         by_columns = sp.csr_matrix(by_rows, shape=(count, count)).tocsc()
         self.starts, self.rows = by_columns.indptr.astype(np.int64), by_columns.indices
@@ -156,7 +156,7 @@ class ScalarPattern:
         return np.where((row < column) | (row < 0) | (column < 0) | upper_of_same, -1, place)
 
 
-def _pattern_of_rows(starts: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _find_rows(starts: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the rows of L, found in two passes: first their lengths."""
     count = len(starts) - 1
     lengths = np.zeros(count + 1, np.int64)

@@ -91,7 +91,7 @@ def progress_bar(*args: Any, **options: Any) -> Any:
     return tqdm(*args, mininterval=seconds, maxinterval=max(10.0, seconds), **options)
 
 
-def compilation_is_due() -> bool:
+def must_compile() -> bool:
     """Return whether no kernel lies compiled on disk."""
     files = (folder.rglob("reference_sim.*-*/*.nbi") for folder in _kernel_folders())
     return not any(chain.from_iterable(files))
@@ -99,7 +99,7 @@ def compilation_is_due() -> bool:
 
 def announce_compilation() -> None:
     """Say on stderr that kernels will be compiled, where none is yet, and where they will lie."""
-    if not compilation_is_due():
+    if not must_compile():
         return
     folders = _kernel_folders()
     writable = [folder for folder in folders if _can_be_written(folder)]

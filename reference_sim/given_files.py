@@ -16,7 +16,7 @@ LONG_NAME = re.compile(rf"(?<![\w-])(?:[\w-]++[ \t]*+\.[ \t]*+){{{DEEPEST}}}")
 QUOTED = re.compile(r'"(?:\\.|[^"\\\n])*+"|\'[^\'\n]*+\'')
 
 
-def regular(path: str | Path) -> Path:
+def demand_file(path: str | Path) -> Path:
     """Return the path. Raises OSError for a folder, pipe or device, which could be read without end."""
     path = Path(path)
     if path.exists() and not path.is_file():
@@ -26,7 +26,7 @@ def regular(path: str | Path) -> Path:
 
 def read_toml(path: str | Path) -> dict[str, Any]:
     """Read a TOML file. Raises OSError, and ValueError as `parse_toml` or for no field, without its name."""
-    path = regular(path)
+    path = demand_file(path)
     if (size := path.stat().st_size) > LARGEST:
         raise ValueError(f"{size} bytes: at most {LARGEST} are read")
     table = parse_toml(path.read_text(encoding="utf-8"))

@@ -120,7 +120,7 @@ class Obstacle:
         share = part / self._substeps
         return (1 - share) * self.positions[whole] + share * self.positions[whole + 1]
 
-    def refined(self, substeps: int) -> Obstacle:
+    def refine(self, substeps: int) -> Obstacle:
         """Return the same motion, linear in between, with `substeps` frames for each frame here."""
         fine = copy.copy(self)
         fine._substeps = self._substeps * substeps
@@ -153,7 +153,7 @@ class Obstacle:
         if samples is None or not (home is rest_points or np.array_equal(home, rest_points)):  # type: ignore[arg-type]
             home = rest_points
             samples = (
-                self._search.listed(points) if home is None else self._search.listed(home, self.region)
+                self._search.group(points) if home is None else self._search.group(home, self.region)
             )
         closest = self._search.nearest(points, hints=hints, samples=samples)
         self._last[kind] = closest.faces, samples, home
@@ -194,7 +194,7 @@ class Obstacle:
             normals[tilted[free]] = offsets / np.linalg.norm(offsets, axis=1)[:, None]
         return Planes(closest.points, normals, closest.faces, closest.barycentric)
 
-    def transported(
+    def transport(
         self, points: np.ndarray, frame: int, rest_points: np.ndarray | None = None
     ) -> np.ndarray:
         """Return points (N, 3) [m] of frame - 1 moved along with the body; at frame 0 nothing has moved.
@@ -217,7 +217,7 @@ class Obstacle:
         if np.linalg.norm(points - closest.points, axis=1).min(initial=np.inf) > DEFAULT_REGION:
             return lambda frame: points.copy()
 
-        def carried(frame: int) -> np.ndarray:
+        def move(frame: int) -> np.ndarray:
             moved = np.empty_like(closest.points)
             carry(
                 points, closest.points, closest.faces, closest.barycentric, before, self.at(frame),
@@ -225,7 +225,7 @@ class Obstacle:
             )  # fmt: skip
             return moved
 
-        return carried
+        return move
 
     def moves_beside(self, points: np.ndarray) -> bool:
         """Return whether it moves, and most points (N, 3) [m] are within BESIDE of it in frame 0."""

@@ -69,11 +69,11 @@ class HessianPattern:
         step = self._stride[first][:, None] + 1
         self.diagonal = (self._base[first][:, None] + np.arange(block) * step).ravel()
 
-    def changing(self, x: np.ndarray, convexity: float = 0.0) -> list[sp.csc_matrix]:
+    def hessians(self, x: np.ndarray, convexity: float = 0.0) -> list[sp.csc_matrix]:
         """Return the Hessians (3V, 3V) of the dynamic terms at x (V, 3)."""
         return [energy.sparse_hessian(x, convexity) for energy in self.energies if energy.dynamic]
 
-    def covering(self, changing: Sequence[sp.csc_matrix]) -> HessianPattern:
+    def widen(self, changing: Sequence[sp.csc_matrix]) -> HessianPattern:
         """Return this pattern, or a wider one if the matrices couple vertices that have no block here.
 
         A wider pattern keeps the blocks it had, so that pairs which come and go do not cost an analysis
@@ -153,7 +153,7 @@ class HessianPattern:
         i, j = np.meshgrid(np.arange(3), np.arange(3), indexing="ij")
         values[self._base[slot][:, None, None] + j * self._stride[slot][:, None, None] + i] += blocks
 
-    def symmetric(self, values: np.ndarray) -> sp.csc_matrix:
+    def symmetrise(self, values: np.ndarray) -> sp.csc_matrix:
         """Return the whole symmetric (3n, 3n) matrix."""
         # The upper halves of its diagonal blocks are stored too.
         lower = sp.tril(sp.csc_matrix((values, self.indices, self.indptr)), format="csc")
@@ -281,9 +281,9 @@ class Potential:
         """Return second derivatives (3V, 3V) [N/m] at x (V, 3) [m], coordinates of a vertex side by side."""
         x = np.ascontiguousarray(x, dtype=np.float64)
         pattern = self.pattern(np.ones(self.cloth.vertex_count, dtype=bool))
-        changing = pattern.changing(x)
-        pattern = pattern.covering(changing)
-        return pattern.symmetric(pattern.assemble(x, changing))
+        changing = pattern.hessians(x)
+        pattern = pattern.widen(changing)
+        return pattern.symmetrise(pattern.assemble(x, changing))
 
     def pattern(self, free: np.ndarray, *, block: int = 3) -> HessianPattern:
         """Return the pattern over the free vertices (V,): of the Hessian, or (block=1) scalar stiffness."""

@@ -95,7 +95,7 @@ class TimeStepper:
             )
         self.cloth, self.guess, self.substeps, self.refreeze = cloth, guess, substeps, refreeze
         self.frame_dt, self.dt = dt, dt / substeps  # between frames, and of one step
-        self.obstacle = obstacle if obstacle is None or substeps == 1 else obstacle.refined(substeps)
+        self.obstacle = obstacle if obstacle is None or substeps == 1 else obstacle.refine(substeps)
         self.potential = Potential([*energies, Inertia(cloth, self.dt)])
         self.quasi_static = quasi_static
         self.minimiser = StepMinimiser(self.potential, **options)
@@ -145,7 +145,7 @@ class TimeStepper:
                 raise ValueError(f"simulate: guess of step {step} is {first.shape}: {x.shape} [m] is due")
         elif self.guess == "body_transported":
             assert self.obstacle is not None
-            first = self.obstacle.transported(x, step, self.cloth.rest_positions)
+            first = self.obstacle.transport(x, step, self.cloth.rest_positions)
         else:
             first = x + self.dt * v if self.guess == "extrapolated" else x.copy()
         first[self.cloth.pins] = handles
@@ -194,7 +194,7 @@ class TimeStepper:
             clock = time.perf_counter()
             after, results = self.advance(frame, state, pin_positions and pin_positions(frame))
             elapsed = time.perf_counter() - clock
-            status, reason = _worst(status, reason, frame, results)
+            status, reason = _judge(status, reason, frame, results)
             if after is None:
                 break
             state = after
@@ -294,7 +294,7 @@ def simulate(
     )
 
 
-def _worst(status: str, reason: str, frame: int, results: Sequence[Result]) -> tuple[str, str]:
+def _judge(status: str, reason: str, frame: int, results: Sequence[Result]) -> tuple[str, str]:
     """Return status and reason of a run after the minimisations on the way to `frame`.
 
     The worst counts, the first of equally bad ones; else the first that round-off excused has the reason.

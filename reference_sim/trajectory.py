@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from reference_sim.files.atomic_files import replacing
-from reference_sim.given_files import regular
+from reference_sim.given_files import demand_file
 
 if TYPE_CHECKING:
     import h5py
@@ -111,16 +111,16 @@ def _read(path: Path) -> Trajectory:
     """Read a file. Raises an exception of any kind for one that is no trajectory or is damaged."""
     import h5py
 
-    with h5py.File(regular(path), "r") as file:
+    with h5py.File(demand_file(path), "r") as file:
         benchmark, vtk = file["benchmark"], file["VTKHDF"]
         provenance = json.loads(benchmark.attrs["provenance"])
         if not isinstance(provenance, dict):
             raise ValueError("its provenance is no JSON object")
         frames = int(benchmark.attrs["frames"])
         fields = benchmark["frame_fields"]
-        vertex_count = int(vtk["NumberOfPoints"][0])
+        vertices = int(vtk["NumberOfPoints"][0])
         return Trajectory(
-            positions=vtk["Points"][: frames * vertex_count].reshape(frames, vertex_count, 3),
+            positions=vtk["Points"][: frames * vertices].reshape(frames, vertices, 3),
             faces=vtk["Polygons/Connectivity"][:].reshape(-1, 3),
             times=vtk["Steps/Values"][:frames],
             frame_seconds=benchmark["frame_seconds"][:frames],

@@ -16,7 +16,7 @@ import pandas as pd
 from reports.figures.charts import energy_series, error_of_page_one, excess_by_motion
 from reports.figures.plotting import Figure, Picture
 from reports.finished_run import Run
-from reports.pictures import side_by_side, worst_frame
+from reports.pictures import draw_methods, worst_frame
 from reports.tables.table import Table
 
 ROWS, COLUMNS = 12, 9  # of a printed table; columns of numbers; the CSV has all
@@ -60,7 +60,7 @@ class TableBlock:
     limit: int = ROWS
     left_out: tuple[str, ...] = ()
 
-    def printed(self, table: Table) -> Table:
+    def cut_table(self, table: Table) -> Table:
         """Return the first columns, and of rows the first of each group; a note says where the others are."""
         rows = [row for row in table.rows if not set(row) & set(self.left_out)]
         heads = [k for k, column in enumerate(table.columns) if column.name in table.grouped_by]
@@ -87,7 +87,7 @@ class TableBlock:
 BLOCKS: tuple[Heading | Figure | TableBlock, ...] = (
     TableBlock("paper_table_1"),
     TableBlock("paper_table_2", limit=24),
-    Figure("frames", side_by_side),
+    Figure("frames", draw_methods),
     Figure("error_against_time", error_of_page_one),
     TableBlock("overview"),
     Heading("The paper's tables"),

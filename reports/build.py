@@ -48,7 +48,7 @@ def build_report(run_dir: str | Path) -> Built:
     """
     # Heavy: not needed for --help.
     from reports.blocks import FIGURES, Report
-    from reports.compare import against_published
+    from reports.compare import compare_published
     from reports.figures.plotting import draw_figures
     from reports.finished_run import read_run
     from reports.pdf import write_pdf
@@ -65,7 +65,7 @@ def build_report(run_dir: str | Path) -> Built:
         page = pool.submit(_write_page, folder, Report(run, tables, {}))
         pdf = write_pdf(folder, Report(run, tables, draw_figures(run, folder.figures, FIGURES)))
         problems = dict.fromkeys([*run.problems, *page.result(), *run.warnings])
-    lines = filter(None, (answer(run, tables), against_published(run)))
+    lines = filter(None, (answer(run, tables), compare_published(run)))
     return Built(pdf, list(problems), "\n".join(lines))
 
 

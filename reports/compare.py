@@ -71,7 +71,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return 1 if any(change.verdict in FAILING for change in comparison.changes) else 0
 
 
-def against_published(run: Run, published: Path = PUBLISHED) -> str:
+def compare_published(run: Run, published: Path = PUBLISHED) -> str:
     """Return in a line how a run agrees with the published one of its study; empty without one.
 
     Networks of one seed are judged by the prediction interval of the published seeds.

@@ -23,19 +23,19 @@ from reports.scene_changes import (
     TIME_TOLERANCE,
     WORSE,
     Change,
-    changed_scenes,
+    compare_scenes,
+    is_negligible,
     side,
     size_of,
-    within_tolerance,
 )
 from reports.statistics.effects import DIFFERENCE, RATIO, Effect, effect
 from reports.statistics.means_and_spreads import Mean, means, value_of
-from reports.statistics.pareto import NETWORK, REPEATS, TIME, WHOLE, timed_rows
+from reports.statistics.pareto import NETWORK, REPEATS, TIME, WHOLE, select_timed
 from reports.statistics.relative_excess import (
     RELATIVE_EXCESS,
+    add_excess,
     excess_of,
     relative_metric,
-    with_relative_excess,
 )
 from reports.statistics.verdicts import effect_of, holm
 from reports.tables.table import DASH, number
@@ -45,13 +45,13 @@ WORST = "cost/frame_worst"  # the time of one frame, which anything else on the 
 CELL = ["scene", "method", "seed", "metric"]
 
 
-def _shared(frames: Sequence[pd.DataFrame], *columns: str) -> list[pd.DataFrame]:
+def _intersect(frames: Sequence[pd.DataFrame], *columns: str) -> list[pd.DataFrame]:
     """Return the rows of both frames whose values in these columns the other has too."""
     keys = [frame.set_index(list(columns)).index for frame in frames]
     return [frame[key.isin(rest)] for frame, key, rest in zip(frames, keys, reversed(keys))]
 
 
-def gone(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
+def find_losses(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
     """Return a line for each method or metric that the later run lacks somewhere."""
     keys = [frame.set_index(CELL).index for frame in (one, other)]
     missing = one[~keys[0].isin(keys[1])].astype({"method": str, "metric": str})
@@ -72,7 +72,7 @@ def endings(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
     off = (both["value_other"] - both["expected"]).abs() > both["tolerance"]
     both.loc[off & (both["status_other"] == "ok"), ["status_other", "reason_other"]] = "failed", "off"
     # A cell that failed has one row, of a metric that it need not have where it ends well.
-    cells = _worst(one).merge(_worst(other), on=CELL[:3], suffixes=("", "_other"))
+    cells = _pick_worst(one).merge(_pick_worst(other), on=CELL[:3], suffixes=("", "_other"))
     rows = pd.concat([both, cells], ignore_index=True)
     good, good_other = rows["status"] == "ok", rows["status_other"] == "ok"
     moved = rows[good != good_other].drop_duplicates([*CELL[:3], "status", "status_other"])
@@ -86,7 +86,7 @@ def endings(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
     ]  # fmt: skip
 
 
-def _worst(frame: pd.DataFrame) -> pd.DataFrame:
+def _pick_worst(frame: pd.DataFrame) -> pd.DataFrame:
     """Return a row of each cell: one that is not ok, where there is one."""
     ordered = frame.iloc[(frame["status"] == "ok").argsort(kind="stable")]
     return ordered.drop_duplicates(CELL[:3])
@@ -135,16 +135,16 @@ def compare(
                 f"results.csv of {name} is not as its run wrote it: run.json has its digest"
             )
     one_protocol((one.protocol, other.protocol), "A and B")
-    _demand_same_scenes(one, other)
+    _check_scenes(one, other)
     cells = [_cells(run) for run in (one, other)]
-    frames = [frame[_matching(frame["method"], methods)] for frame in cells]
+    frames = [frame[_match(frame["method"], methods)] for frame in cells]
     of_cells = endings(*frames)
-    of_metrics = [frame[_matching(frame["metric"], metrics)] for frame in frames]
+    of_metrics = [frame[_match(frame["metric"], metrics)] for frame in frames]
     if not times or set(one.frame["hardware"]) != set(other.frame["hardware"]):
         machines = [m.name for run in (one, other) for m in run.metrics.values() if m.of == "machine"]
         of_metrics = [frame[~frame["metric"].isin(machines)] for frame in of_metrics]
-    losses = [] if shared else gone(*of_metrics)
-    both = _shared(of_metrics, *CELL)
+    losses = [] if shared else find_losses(*of_metrics)
+    both = _intersect(of_metrics, *CELL)
     if both[0].empty:
         raise ResultsError(
             "the two runs share no such scene, method, seed and metric: nothing to compare"
@@ -157,12 +157,12 @@ def compare(
         raise ResultsError(
             f"{place}: of protocol {clashes.iloc[0]} in A, {protocol} in B: another reference or scene"
         )
-    lone_seeds = _of_one_seed(*of_metrics)
+    lone_seeds = _find_lone_seeds(*of_metrics)
     networks = set(lone_seeds[1]["method"])
     both = [frame[~(frame["seeded"] & frame["method"].isin(networks))] for frame in both]
-    of_means, count = _means(one, *_without_more_noise(*both), basis=cells[0])
-    earlier, later = _with_known_zero(one, *lone_seeds, basis=cells[0])
-    of_one_seed = changed_scenes(earlier, later, _metrics(one))
+    of_means, count = _means(one, *_cap_noise(*both), basis=cells[0])
+    earlier, later = _replace_energies(one, *lone_seeds, basis=cells[0])
+    of_one_seed = compare_scenes(earlier, later, _metrics(one))
     order = (GONE, WORSE, BETTER, OTHER)
     changes = sorted([*losses, *of_cells, *of_means, *of_one_seed], key=lambda c: order.index(c.verdict))
     return Comparison(tuple(changes), count, _headline(one, of_metrics, changes))
@@ -180,13 +180,13 @@ def _headline(
 
     Run times are of the scenes that page one has them of.
     """
-    garment, (_, clips) = run.first_garment, timed_rows(run, run.frame)
+    garment, (_, clips) = run.first_garment, select_timed(run, run.frame)
     usable = [f[f["usable"] & (f["case"] == "")] for f in frames]
     rows, clip_rows = (
-        _shared([f[f[column].isin(names)] for f in usable], "scene", "method", "metric")
+        _intersect([f[f[column].isin(names)] for f in usable], "scene", "method", "metric")
         for column, names in (("place", [garment]), ("scene", clips))
     )
-    names = run.ordered(set(rows[0]["method"]) - run.twins - set(run.with_role("reference-variant")))
+    names = run.order(set(rows[0]["method"]) - run.twins - set(run.with_role("reference-variant")))
     headline = {}
     for method in sorted(names, key=lambda name: name != NETWORK):
         seeds = [set(f[(f["method"] == method) & f["seeded"]]["seed"]) for f in rows]
@@ -213,7 +213,7 @@ def _value(run: Run, rows: pd.DataFrame, method: str, metric: str) -> float | No
     return excess.typical if excess else None
 
 
-def _of_one_seed(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:
+def _find_lone_seeds(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:
     """Return the usable rows, in scenes of both, of networks of which the later run alone has one seed.
 
     That seed is judged by the prediction interval of those of the earlier run.
@@ -222,10 +222,10 @@ def _of_one_seed(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:
     before, after = (frame.groupby("method", observed=True)["seed"].nunique() for frame in rows)
     networks = [name for name in after.index[after == 1] if before.get(name, 0) > 1]
     rows = [frame[frame["method"].isin(networks)] for frame in rows]
-    return _shared(rows, "scene", "method", "metric")
+    return _intersect(rows, "scene", "method", "metric")
 
 
-def _without_more_noise(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:
+def _cap_noise(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:
     """Return both; no later answer is less certain than the earlier, which would hide changes."""
     cap = one.set_index(CELL)["uncertainty"].reindex(other.set_index(CELL).index).fillna(0.0).to_numpy()
     timed = other["unit"].isin(("s", "ms"))
@@ -233,7 +233,7 @@ def _without_more_noise(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataF
     return [one, other.assign(uncertainty=noise.where(timed | (noise <= cap), cap))]
 
 
-def _demand_same_scenes(one: Run, other: Run) -> None:
+def _check_scenes(one: Run, other: Run) -> None:
     """Raise ResultsError where an entry of both that makes their scenes differs."""
     before, after = (_entries_of_scenes(run) for run in (one, other))
     for name in before:
@@ -267,7 +267,7 @@ def _cells(run: Run) -> pd.DataFrame:
     return frame[frame["metric"] != REPEATS].drop(columns="moved")
 
 
-def _matching(names: pd.Series, patterns: str) -> pd.Series:
+def _match(names: pd.Series, patterns: str) -> pd.Series:
     hits = [n for n in names.unique() if any(fnmatchcase(n, p.strip()) for p in patterns.split(","))]
     return names.isin(hits)
 
@@ -279,7 +279,7 @@ def _means(
 
     basis: all rows of the earlier run, whatever methods and metrics are compared.
     """
-    rows = _over_the_same(*_with_known_zero(run, one, other, basis=basis))
+    rows = _select_common(*_replace_energies(run, one, other, basis=basis))
     first, second = (means(frame, *GROUP).to_dict() for frame in rows)
     differ = {key: (mean, second[key]) for key, mean in first.items() if mean.cells != second[key].cells}
     metrics = _metrics(run)
@@ -296,12 +296,12 @@ def _means(
     changes = []
     for (place, method, metric, mean, new, shift), raw_p in zip(candidates, p_values):
         p = None if raw_p is None else next(corrected)
-        if within_tolerance(metric, mean, new, shift, float(scales[place, metric.name])):
+        if is_negligible(metric, mean, new, shift, float(scales[place, metric.name])):
             continue
         if metric.of == "machine" and mean.uncertainty is None and mean.seeds < 2:
             if shift.scale == RATIO and max(shift.shown, 1.0 / shift.shown) < ONCE:
                 continue
-        elif not _beyond_noise(metric, shift, p):
+        elif not _exceeds_noise(metric, shift, p):
             continue
         size = size_of(metric, mean, new, shift, p)
         changes.append(
@@ -311,12 +311,12 @@ def _means(
     pairs = rows[0][rows[0]["place"] != rows[0]["scene"]]
     garments = dict(zip(pairs["scene"], pairs["place"]))
     before, after = (frame[frame["scene"].isin(garments)] for frame in rows)
-    of_scenes = changed_scenes(before, after, metrics)
+    of_scenes = compare_scenes(before, after, metrics)
     changes += [c for c in of_scenes if (garments[c.place], c.method, c.metric) not in reported]
     return changes, len(first)
 
 
-def _with_known_zero(run: Run, *frames: pd.DataFrame, basis: pd.DataFrame) -> list[pd.DataFrame]:
+def _replace_energies(run: Run, *frames: pd.DataFrame, basis: pd.DataFrame) -> list[pd.DataFrame]:
     """Return the frames with relative excesses by the references of the basis in place of energies.
 
     Of energies whose zero is a choice, in scenes whose reference and skinning the basis has.
@@ -324,7 +324,7 @@ def _with_known_zero(run: Run, *frames: pd.DataFrame, basis: pd.DataFrame) -> li
     shares = []
     for frame in frames:
         for metric in (m for m in run.metrics.values() if m.arbitrary_zero):
-            frame = with_relative_excess(run, frame, metric.name, basis=basis)
+            frame = add_excess(run, frame, metric.name, basis=basis)
             excess = frame[frame["metric"] == relative_metric(metric.name).name]
             covered = frame.set_index(CELL[:3]).index.isin(excess.set_index(CELL[:3]).index)
             frame = frame[~(covered & (frame["metric"] == metric.name))]
@@ -345,19 +345,19 @@ def _effect(metric: Metric, new: Mean, before: Mean) -> Effect:
     return effect(new, before, DIFFERENCE) if metric.arbitrary_zero else effect_of(metric, new, before)
 
 
-def _beyond_noise(metric: Metric, shift: Effect, p: float | None) -> bool:
+def _exceeds_noise(metric: Metric, shift: Effect, p: float | None) -> bool:
     """Return whether a change is more than what another draw of seeds, or of times, would do."""
     if metric.of == "machine":
         low, high = shift.ends or (shift.value - shift.uncertainty, shift.value + shift.uncertainty)
         return shift.scale != RATIO or max(low, -high) > math.log1p(TIME_TOLERANCE)  # from 0, or to 0
     if p is None:
-        return abs(shift.above()) > SPREADS * shift.uncertainty
-    return abs(shift.above()) > shift.uncertainty and p < LEVEL
+        return abs(shift.gap()) > SPREADS * shift.uncertainty
+    return abs(shift.gap()) > shift.uncertainty and p < LEVEL
 
 
-def _over_the_same(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:
+def _select_common(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:
     """Return the usable rows of both, without cases, of scenes that have all seeds of their group."""
-    rows = _shared([f[f["usable"] & (f["case"] == "")] for f in (one, other)], *CELL)
+    rows = _intersect([f[f["usable"] & (f["case"] == "")] for f in (one, other)], *CELL)
     whole = [
         frame.groupby([*GROUP, "scene"])["seed"].transform("nunique")
         == frame.groupby(GROUP)["seed"].transform("nunique")

@@ -13,7 +13,7 @@ from benchmarks.results.protocol import LEAST_MOTIONS
 from benchmarks.results.row import DECLARED, ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reports.finished_run import Run, read_run
-from reports.page.write_page import filled, table_data
+from reports.page.write_page import fill_page, table_data
 from reports.statistics.effects import Effect
 from reports.statistics.means_and_spreads import mean_of
 from reports.statistics.relative_excess import excess_of
@@ -65,7 +65,7 @@ class Scored:
     def proof(self) -> str:
         """Return what its numbers rest on: a program, files, or a declaration."""
         files = self.run.config.get("entry") or {}
-        if self.folder is None or RunFolder(self.folder).changed(files) or not files:
+        if self.folder is None or RunFolder(self.folder).find_changes(files) or not files:
             return VERIFIED if self.folder is None else UNVERIFIED
         return VERIFIED if self.run.config["metadata"].get("program") else FILES_ONLY
 
@@ -99,7 +99,7 @@ class Scored:
         return (None, self.title, energy, *means, clock, self.learned_from, self.proof(), *origin, digest)
 
 
-def of_entry(folder: Path) -> Scored:
+def load_entry(folder: Path) -> Scored:
     """Return the entry in a folder.
 
     Raises:
@@ -122,11 +122,11 @@ def of_entry(folder: Path) -> Scored:
     return Scored(run, name, f"{title}; {authors}", data, scenes, folder)
 
 
-def of_published(name: str, run: Run, scenes: Sequence[str]) -> list[Scored]:
+def list_published(name: str, run: Run, scenes: Sequence[str]) -> list[Scored]:
     """Return the methods of the published run of that name that have rows in these scenes."""
     rows = run.garment_rows
     rows = rows[rows["scene"].isin(scenes) & rows["usable"]]
-    methods = run.ordered(set(rows["method"]) & set(run.with_role(*ROLES)))
+    methods = run.order(set(rows["method"]) & set(run.with_role(*ROLES)))
     return [
         Scored(run, method, run.label(method), f"see run {name}", tuple(scenes)) for method in methods
     ]
@@ -156,7 +156,7 @@ def entries_tables(
     for (protocol, scenes), scored in sorted(
         groups.items(), key=lambda item: (-len(item[0][1]), item[0])
     ):
-        every = [*scored, *(of_published(name, run, scenes) if protocol == run.protocol else ())]
+        every = [*scored, *(list_published(name, run, scenes) if protocol == run.protocol else ())]
         lines = sorted(((entry.cells(), entry) for entry in every), key=lambda line: _excess(line[0]))
         part = "all" if set(scenes) == set(full) else f"{len(scenes)} of {len(full)}: {', '.join(scenes)}"
         title = f"Protocol {protocol}" if protocol[:1].isdigit() else protocol.capitalize()
@@ -177,7 +177,7 @@ def page_of(folder: Path, name: str, run: Run) -> str:
     Raises:
         ResultsError: scores that cannot be read.
     """
-    entries = [of_entry(path.parent) for path in sorted(folder.glob("*/entry.toml"))]
+    entries = [load_entry(path.parent) for path in sorted(folder.glob("*/entry.toml"))]
     content = []
     for table, lines in entries_tables(entries, name, run):
         content.append(data := table_data(lines[0].run, table))
@@ -185,4 +185,4 @@ def page_of(folder: Path, name: str, run: Run) -> str:
             row[1] = scored.title_cell()
     text = json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
     # No text of an entry ends the element.
-    return filled("entries.html", SCRIPTS, content=text.replace("<", "\\u003c"))
+    return fill_page("entries.html", SCRIPTS, content=text.replace("<", "\\u003c"))

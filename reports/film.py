@@ -51,14 +51,14 @@ def select_roll_outs(
         shown_seed = of_method["seed"].min() if seed is None or not of_method["seeded"].any() else seed
         cloth = run.roll_outs.cloth(scene, method, int(shown_seed)) if len(of_method) else None
         if cloth is None or not cloth.finite().frames:
-            reason = "; ".join(run.problems) or _stored(folder, run, scene)
+            reason = "; ".join(run.problems) or _list_stored(folder, run, scene)
             raise ResultsError(f"{folder.path}: no roll-out of '{method}' in {scene}: {reason}")
         cloths[method] = cloth.finite()
     labels = {name: run.label(name) for name in cloths}
     return SceneRollOuts(scene, cloths, run.roll_outs.body(scene), labels)
 
 
-def _stored(folder: RunFolder, run: Run, scene: str) -> str:
+def _list_stored(folder: RunFolder, run: Run, scene: str) -> str:
     """Return the methods of the roll-outs in a scene, or the scenes that have any."""
     cells = run.cells()[["scene", "method", "seed"]].drop_duplicates().itertuples(index=False, name=None)
     stored = [cell for cell in cells if folder.trajectory_path(*cell).is_file()]

@@ -151,7 +151,7 @@ class Run:
         """Garment that page one and the claims are about; empty for a run without garments."""
         return next(iter(self.garments(self.garment_rows)), "")
 
-    def ordered(self, methods: Iterable[str]) -> list[str]:
+    def order(self, methods: Iterable[str]) -> list[str]:
         """Return the methods without repeats: by role, then as declared, members of a family by level."""
         places = list(self.methods)
         first: dict[str, int] = {}
@@ -197,13 +197,13 @@ class Run:
             remarks.append(f"Not as the run wrote them: {shorten(', '.join(self.changed), 100)}")
         return remarks
 
-    def standing_apart(self, frame: pd.DataFrame) -> set[str]:
+    def find_ablations(self, frame: pd.DataFrame) -> set[str]:
         """Return the ablations whose base has a usable number: they have their own table."""
         usable = set(frame[frame["usable"]]["method"])
         return {name for name in self.with_role("ablation") if self.methods[name].base in usable}
 
 
-def shown_seeds(rows: pd.DataFrame) -> pd.Series:
+def pick_seeds(rows: pd.DataFrame) -> pd.Series:
     """Return (scene, method) -> first seed whose roll-out came to its end; the first where none did."""
     good = rows[rows["usable"]].groupby(["scene", "method"])["seed"].min()
     return good.combine_first(rows.groupby(["scene", "method"])["seed"].min()).astype(int)
@@ -278,11 +278,11 @@ def read_run(folder: RunFolder) -> Run:
     config, rows = folder.read_config(), folder.read_rows()
     if not rows:
         raise ResultsError(f"{folder.rows_path}: holds no rows; nothing to report")
-    changes = folder.changed(config.get("digests") or {})
+    changes = folder.find_changes(config.get("digests") or {})
     run = make_run(config, rows, [name for name, state in changes.items() if state == "damaged"])
     return replace(
         run,
         protocol=one_protocol(run.frame["protocol"], folder.rows_path),
-        frame_energies=run_folder.read_frame_energies(run_folder.packed(folder.frame_energies_path)),
+        frame_energies=run_folder.read_frame_energies(run_folder.find_file(folder.frame_energies_path)),
         roll_outs=RollOuts(folder, run.problems),
     )

@@ -15,7 +15,7 @@ import typst
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.files.atomic_files import replacing
 from reports.blocks import BLOCKS, Heading, Report, TableBlock
-from reports.figures.plotting import Figure, Picture, printable
+from reports.figures.plotting import Figure, Picture, escape
 from reports.finished_run import Run
 from reports.sentences import headline
 from reports.tables.table import CellText, Column, Table, column_texts, remarks_below
@@ -56,7 +56,7 @@ def lay_out(report: Report, block: Figure | TableBlock) -> list[Values]:
         return [_figure(picture)] if picture else []
     if block.name not in report.tables:
         return []
-    table = block.printed(report.tables[block.name])
+    table = block.cut_table(report.tables[block.name])
     return [lay_out_table(report.run, table)] if table.rows else []
 
 
@@ -152,7 +152,7 @@ def write_pdf(folder: RunFolder, report: Report) -> Path:
         TEMPLATE.read_bytes(),
         root=str(folder.path),
         ignore_system_fonts=True,
-        sys_inputs={"content": printable(values)},
+        sys_inputs={"content": escape(values)},
     )
     with replacing(folder.report_path) as temporary:
         stamp = int(datetime.fromisoformat(str(finished)).timestamp()) if finished else 0

@@ -14,9 +14,9 @@ from scipy.ndimage import uniform_filter1d
 
 from reference_sim.trajectory import Trajectory
 from reports.figures.plotting import DOTS, PAGE_WIDTH, Drawing, file_name, new_figure
-from reports.finished_run import Run, shown_seeds
+from reports.finished_run import Run, pick_seeds
 from reports.statistics.outcomes import LEARNED, leads
-from reports.tables.table import scene_in_words
+from reports.tables.table import name_scene
 
 BODY_COLOUR = (0.80, 0.77, 0.74)
 CLOTH_COLOUR = (0.72, 0.33, 0.22)  # mid-tone: folds show in both directions, in grey too
@@ -37,7 +37,7 @@ class Camera:
     height: float
     turn: float = -25.0
 
-    def seen(self, positions: np.ndarray) -> np.ndarray:
+    def project(self, positions: np.ndarray) -> np.ndarray:
         """Return positions (V,3) [m] as right, up and towards the camera, from the picture's middle [m]."""
         return (positions - self.centre) @ camera_axes(self.turn)
 
@@ -84,10 +84,10 @@ def _paint(
     from reference_sim.geometry.surface import vertex_normals  # loads numba
 
     w, h = size
-    view = camera.seen(surface.positions)
+    view = camera.project(surface.positions)
     scale = h / camera.height
     points = np.stack([w / 2.0 + scale * view[:, 0], h / 2.0 - scale * view[:, 1]], axis=1)
-    pixels, faces, weights = _covered(points[surface.faces], w, h)
+    pixels, faces, weights = _rasterise(points[surface.faces], w, h)
     depths = np.einsum("pk,pk->p", weights, view[surface.faces[faces], 2]) + surface.lift
     np.maximum.at(depth, pixels, depths)
     front = depths == depth[pixels]
@@ -100,7 +100,7 @@ def _paint(
     image[pixels] = (0.36 + 0.72 * key + 0.16 * fill)[:, None] * (weights * colours[corners]).sum(axis=1)
 
 
-def _covered(corners: np.ndarray, w: int, h: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _rasterise(corners: np.ndarray, w: int, h: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return for each pixel in each triangle (F,3,2) [pixels]: its number, the face, weights (P,3)."""
     low = np.clip(np.floor(corners.min(axis=1)).astype(int), 0, [w, h])
     high = np.clip(np.ceil(corners.max(axis=1)).astype(int), 0, [w, h])
@@ -188,7 +188,9 @@ def camera_path(group: SceneRollOuts, axes: np.ndarray) -> tuple[np.ndarray, flo
     return centres @ axes.T, MARGIN * float(max(up, TALL * right))
 
 
-def drawn(mesh: Trajectory, frame: int, colour: tuple[float, float, float], lift: float = 0.0) -> Surface:
+def freeze(
+    mesh: Trajectory, frame: int, colour: tuple[float, float, float], lift: float = 0.0
+) -> Surface:
     """Return a roll-out at that frame, past its end at its last, as it is painted."""
     return Surface(mesh.positions[min(frame, mesh.frames - 1)], mesh.faces, colour, lift)
 
@@ -200,14 +202,14 @@ def draw_frames(
     width, height = width - width % 2, round(width * TALL / 2) * 2
     centres, half = camera_path(group, camera_axes(-azimuth))
     for frame in range(group.longest.frames) if frames is None else frames:
-        body = drawn(group.body, frame, BODY_COLOUR) if group.body else None
-        cloths = [drawn(cloth, frame, CLOTH_COLOUR, LIFT) for cloth in group.series.values()]
+        body = freeze(group.body, frame, BODY_COLOUR) if group.body else None
+        cloths = [freeze(cloth, frame, CLOTH_COLOUR, LIFT) for cloth in group.series.values()]
         camera = Camera(centres[frame], 2.0 * half, -azimuth)
         pictures = (255.0 * np.array(views(body, cloths, camera, width, height))).astype(np.uint8)
-        yield _composed(group, pictures, frame, float(group.longest.times[frame]))
+        yield _compose(group, pictures, frame, float(group.longest.times[frame]))
 
 
-def _composed(group: SceneRollOuts, pictures: np.ndarray, frame: int, time: float) -> np.ndarray:
+def _compose(group: SceneRollOuts, pictures: np.ndarray, frame: int, time: float) -> np.ndarray:
     """Compose pictures (N,H,W,3) in rows, each under its method's name, with the time [s] below them."""
     from matplotlib import get_data_path
     from PIL import Image, ImageDraw, ImageFont
@@ -234,15 +236,15 @@ def _composed(group: SceneRollOuts, pictures: np.ndarray, frame: int, time: floa
     return np.asarray(image)
 
 
-def side_by_side(run: Run) -> Drawing | None:
+def draw_methods(run: Run) -> Drawing | None:
     """Draw the methods of page one at one frame of the first whole motion that kept their roll-outs.
 
     Those that ended early are left out.
     """
     rows = run.garment_rows
     for scene in [scene for scenes in run.garments(rows).values() for scene in scenes]:
-        if group := _whole(run, scene):
-            return _still(group, *group.lively_frame())
+        if group := _gather(run, scene):
+            return _draw_still(group, *group.lively_frame())
     return None
 
 
@@ -262,18 +264,18 @@ def worst_frame(run: Run) -> Drawing | None:
         return None
     above = (totals[network] - totals[run.reference]).dropna()
     scene, seconds = above.idxmax()
-    if not (group := _whole(run, scene)):
+    if not (group := _gather(run, scene)):
         return None
     frame = int(np.argmin(np.abs(group.longest.times - seconds)))
     reason = f"where {run.label(network)} has most energy above the reference"
-    return _still(group, frame, f"{reason}, {above.max():.2g} J", "worst_frame")
+    return _draw_still(group, frame, f"{reason}, {above.max():.2g} J", "worst_frame")
 
 
-def _whole(run: Run, scene: str) -> SceneRollOuts | None:
+def _gather(run: Run, scene: str) -> SceneRollOuts | None:
     """Return page one's methods that came to the scene's end; None without any."""
     rows = run.garment_rows
     rows = rows[(rows["metric"] == "energy/total") & (rows["scene"] == scene)]
-    seeds = shown_seeds(rows).get(scene, {})
+    seeds = pick_seeds(rows).get(scene, {})
     cloths = {name: run.roll_outs.cloth(scene, name, int(seeds[name])) for name in leads(run, rows)}
     frames = max((cloth.frames for cloth in cloths.values() if cloth), default=0)
     series = {name: cloth for name, cloth in cloths.items() if cloth and cloth.frames == frames}
@@ -281,7 +283,7 @@ def _whole(run: Run, scene: str) -> SceneRollOuts | None:
     return SceneRollOuts(scene, series, run.roll_outs.body(scene), labels) if series else None
 
 
-def _still(group: SceneRollOuts, frame: int, reason: str, name: str = "") -> Drawing:
+def _draw_still(group: SceneRollOuts, frame: int, reason: str, name: str = "") -> Drawing:
     width = PAGE_WIDTH / min(len(group.series), PER_ROW) * DOTS
     (image,) = draw_frames(group, round(min(width, WIDEST * DOTS)), AZIMUTH, [frame])
     high, wide = image.shape[:2]
@@ -290,5 +292,5 @@ def _still(group: SceneRollOuts, frame: int, reason: str, name: str = "") -> Dra
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.imshow(image, interpolation="none")
     axes.set_axis_off()
-    caption = f"{scene_in_words(group.scene)}: frame {frame}, {reason}."
+    caption = f"{name_scene(group.scene)}: frame {frame}, {reason}."
     return Drawing(figure, name or f"frames_{file_name(group.scene)}", caption, vector=False)

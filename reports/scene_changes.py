@@ -19,7 +19,7 @@ from benchmarks.metric import Metric
 from benchmarks.results.protocol import LEVEL
 from reports.statistics.effects import DIFFERENCE, RATIO, Effect
 from reports.statistics.means_and_spreads import AT_REFERENCE, Mean
-from reports.tables.table import number, with_spread
+from reports.tables.table import format_spread, number
 
 GONE, WORSE, BETTER, OTHER = "gone", "worse", "better", "changed"  # verdicts, the first two fail
 FAILING = (GONE, WORSE)
@@ -70,7 +70,7 @@ def side(metric: Metric, before: float, after: float, difference: float) -> str:
 
 def size_of(metric: Metric, mean: Mean, new: Mean, shift: Effect, p: float | None) -> str:
     """Return a change as "0.21 ± 0.010 -> 0.26 ± 0.010 J, × 1.24 (1.20 to 1.28), p 0.0030"."""
-    before, after = (with_spread(m.value, m.spread_or_uncertainty) for m in (mean, new))
+    before, after = (format_spread(m.value, m.spread_or_uncertainty) for m in (mean, new))
     sign = "×" if shift.scale == RATIO else "by"
     text = f"{before} -> {after}{_unit(metric)}, {sign} {number(shift.shown)}"
     if shift.interval:
@@ -82,7 +82,7 @@ def _unit(metric: Metric) -> str:
     return "" if metric.unit == "1" else f" {metric.unit}"
 
 
-def within_tolerance(metric: Metric, mean: Mean, new: Mean, shift: Effect, scale: float) -> bool:
+def is_negligible(metric: Metric, mean: Mean, new: Mean, shift: Effect, scale: float) -> bool:
     """Return whether a change of means is too small to be one.
 
     scale: the median method's value there; unit of a difference whose unit is unknown.
@@ -99,7 +99,7 @@ ODD = 3.0  # times the median scatter of scenes, beyond which a scene is left ou
 NETWORK_METRIC = ["method", "metric"]
 
 
-def changed_scenes(one: pd.DataFrame, other: pd.DataFrame, metrics: dict[str, Metric]) -> list[Change]:
+def compare_scenes(one: pd.DataFrame, other: pd.DataFrame, metrics: dict[str, Metric]) -> list[Change]:
     """Return the changes of single scenes; rows of both runs are of the same cells. Costs are left out."""
     from scipy import stats
 

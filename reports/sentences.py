@@ -11,10 +11,10 @@ import pandas as pd
 
 from reports.finished_run import Run
 from reports.statistics.means_and_spreads import value_of
-from reports.statistics.outcomes import BAD, EXTERNAL, LEARNED, counted, leads, published_verdicts
-from reports.statistics.paper_claims import counts, in_words, judged
-from reports.statistics.pareto import run_time, timed_rows
-from reports.statistics.relative_excess import RELATIVE_EXCESS, excess_of, with_relative_excess
+from reports.statistics.outcomes import BAD, EXTERNAL, LEARNED, leads, published_verdicts, tally
+from reports.statistics.paper_claims import count, judge_claims, phrase
+from reports.statistics.pareto import run_time, select_timed
+from reports.statistics.relative_excess import RELATIVE_EXCESS, add_excess, excess_of
 from reports.statistics.verdicts import compare_methods
 from reports.tables.table import number
 
@@ -23,18 +23,18 @@ ALIKE = "dynamics/correlation"
 
 def headline(run: Run) -> list[tuple[str, str]]:
     """Return (topic, its sentences) for each topic of page one, the verdict first."""
-    texts = {**_measured(run), "How it ended": endings(run)}
-    return [(topic, unbroken(text)) for topic, text in texts.items() if text]
+    texts = {**_write_topics(run), "How it ended": endings(run)}
+    return [(topic, bind_units(text)) for topic, text in texts.items() if text]
 
 
 @lru_cache(maxsize=4)
-def _measured(run: Run) -> dict[str, str]:
+def _write_topics(run: Run) -> dict[str, str]:
     rows = run.garment_rows[run.garment_rows["garment"] == run.first_garment]
-    rows = with_relative_excess(run, rows)
+    rows = add_excess(run, rows)
     return {
         "Verdict": verdict(run, rows),
-        FELL: _fallen(run, rows),
-        TRAINED: _trained(run, rows),
+        FELL: _name_fallen(run, rows),
+        TRAINED: _rate_training(run, rows),
         "How certain": _certainty(run),
     }
 
@@ -42,7 +42,7 @@ def _measured(run: Run) -> dict[str, str]:
 FELL = "What fell off the body"
 
 
-def _fallen(run: Run, rows: pd.DataFrame) -> str:
+def _name_fallen(run: Run, rows: pd.DataFrame) -> str:
     """Name the methods with roll-outs that have less energy than any garment that is worn."""
     rows = rows[rows["metric"] == RELATIVE_EXCESS.name]
     names = [
@@ -56,7 +56,7 @@ def _fallen(run: Run, rows: pd.DataFrame) -> str:
 TRAINED = "How far trained"
 
 
-def _trained(run: Run, rows: pd.DataFrame) -> str:
+def _rate_training(run: Run, rows: pd.DataFrame) -> str:
     """Say how far networks of the run are from the package's, which are fully trained."""
     texts = []
     for name in run.with_role("network"):
@@ -73,7 +73,7 @@ def verdict(run: Run, frame: pd.DataFrame) -> str:
     It is the user's own, or else the first network of page one that these rows have.
     """
     names = [name for name in leads(run, frame) if run.methods[name].role in (*LEARNED, EXTERNAL)]
-    rows = with_relative_excess(run, frame)
+    rows = add_excess(run, frame)
     excesses = {name: excess for name in names if (excess := excess_of(run, rows, name))}
     if not excesses:
         return ""
@@ -97,7 +97,7 @@ def verdict(run: Run, frame: pd.DataFrame) -> str:
 
 def _times_faster(run: Run, name: str) -> int:
     """Return to one digit how many times as long the reference takes; 0 where that is unknown."""
-    timed, _ = timed_rows(run, run.garment_rows)
+    timed, _ = select_timed(run, run.garment_rows)
     metric = run.metrics.get(run_time(timed))
     effect = compare_methods(run, timed, metric, run.reference, name).effect if metric else None
     bound = min(effect.interval or (effect.shown,)) if effect else 0.0
@@ -121,19 +121,19 @@ def _kind(run: Run, scenes: Collection[str]) -> str:
 
 def _certainty(run: Run) -> str:
     """Say which primary claims hold, with one seed also which hold in the published run."""
-    verdicts = counts(judged(run))
+    verdicts = count(judge_claims(run))
     if not verdicts:
         return ""
     tests = f"{verdicts.total()} test{'' if verdicts.total() == 1 else 's'}"
     published = published_verdicts() if run.frame["seed"].nunique() == 1 else ""
     remark = f" with one seed; in the published run {published}" if published else ""
-    return f"Of {tests} of primary claims of the paper {in_words(verdicts)}{remark}."
+    return f"Of {tests} of primary claims of the paper {phrase(verdicts)}{remark}."
 
 
 def endings(run: Run) -> str:
     """Say how many cells, checks and stress tests did not end well, and how; empty where all did."""
     parts = []
-    for kind, statuses in counted(run).items():
+    for kind, statuses in tally(run).items():
         if bad := [f"{statuses[name]} {name}" for name in BAD if statuses[name]]:
             parts.append(f"of {sum(statuses.values()):,} {kind} {', '.join(bad)}")
     parts += [f"{len(run.problems)} files could not be read"] if run.problems else []
@@ -141,6 +141,6 @@ def endings(run: Run) -> str:
     return f"{text[:1].upper()}{text[1:]}." if text else ""
 
 
-def unbroken(text: str) -> str:
+def bind_units(text: str) -> str:
     """Return the text with each number on the line of its unit."""
     return re.sub(r"(?<=\d) (?=(J|ms|mm|1/m|%)\b|%)", "\u00a0", text)

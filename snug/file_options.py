@@ -155,16 +155,16 @@ def parse_garment_file(text: str) -> GarmentFile:
     if "shift" in options:
         shift = options["shift"]
         options["shift"] = tuple(shift) if isinstance(shift, list) else (shift,)
-    return _made(GarmentFile, options, text)
+    return _make(GarmentFile, options, text)
 
 
 def parse_motion_files(text: str) -> tuple[str, MotionFileOptions]:
     """Return the path that PATH[,key=value...] means, and how to read it. Raises ValueError."""
     path, options = split_words(text)
-    return path, _made(MotionFileOptions, options, text)
+    return path, _make(MotionFileOptions, options, text)
 
 
-def _made(kind: Any, options: dict[str, Any], text: str) -> Any:
+def _make(kind: Any, options: dict[str, Any], text: str) -> Any:
     names = [field.name for field in fields(kind)]
     for name in options:
         if name not in names:

@@ -46,13 +46,13 @@ PAPER_NEAREST_VERTEX = replace(
 )
 
 
-def _without(term: str, recipe: Recipe = DEFAULT) -> Recipe:
+def _drop(term: str, recipe: Recipe = DEFAULT) -> Recipe:
     name = f"{recipe.name}-no-{term}".removeprefix("default-")
     return replace(recipe, name=name, terms=tuple(name for name in TERMS if name != term))
 
 
 # The columns of the paper's table 2.
-PAPER_ABLATIONS = tuple(_without(term, PAPER) for term in TERMS if term != "collision")
+PAPER_ABLATIONS = tuple(_drop(term, PAPER) for term in TERMS if term != "collision")
 PAPERS = (PAPER, PAPER_CONTACT, PAPER_NEAREST_VERTEX, *PAPER_ABLATIONS)
 # Vertices of a simulation depend on more than two frames before: longer windows follow them better (7 mm
 # instead of 13 on the training motions at 500 vertices), and there is no energy that a window could
@@ -112,7 +112,7 @@ PBNS_SPRINGS = replace(PBNS, name="pbns-springs", material="pbns", contact_sampl
 # 0.033, without 0.027 (docs/notebook/simulator.md).
 ABLATIONS = (
     replace(DEFAULT, name="shapes", shape_range=3.0, shape_of="clip", shape_share=0.5),
-    *(_without(term) for term in TERMS),
+    *(_drop(term) for term in TERMS),
     replace(DEFAULT, name="detached-past", inertia_form="detached_past"),
     replace(DEFAULT, name="two-transitions", inertia_form="two_transitions"),
     replace(DEFAULT, name="no-noise", h0_sigma=0.0, remembered=False),

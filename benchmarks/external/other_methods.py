@@ -114,7 +114,7 @@ def _write_ncs(part: Path, scene: BuiltScene, dressed: Dressed, name: str) -> No
     for folder in (models, data, lists, configs):
         folder.mkdir(parents=True)
     single: dict[str, Any] = {  # ncs/model/body.py:18-23; vertices and rest pose: float32
-        "vertices": body.shaped(dressed.betas), "blend_weights": body.skinning_weights,
+        "vertices": body.rest_vertices(dressed.betas), "blend_weights": body.skinning_weights,
         "joints": body.joints(dressed.betas), "rest_pose": np.zeros((len(body.parents), 3)),
     }  # fmt: skip
     single = {key: array.astype(np.float32) for key, array in single.items()}

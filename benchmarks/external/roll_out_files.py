@@ -121,13 +121,13 @@ def read_roll_out(path: str | Path) -> StoredRollOut:
             f"{path}: unknown kind of roll-out: give one of {', '.join(suffixes)}, or a folder"
         )
     try:
-        return _checked(_READERS.get(suffix, _meshes)(path))
+        return _check(_READERS.get(suffix, _meshes)(path))
     except Exception as error:  # a damaged file fails in nearly every way
         reason = " ".join(str(error).split())[:300] or type(error).__name__
         raise RollOutFileError(reason if path in reason else f"{path}: {reason}") from None
 
 
-def _checked(arrays: Mapping[str, Any]) -> StoredRollOut:
+def _check(arrays: Mapping[str, Any]) -> StoredRollOut:
     """Return the arrays, their shapes compared. Raises ValueError, without the file's name."""
     arrays = {name: np.asarray(array) for name, array in arrays.items() if array is not None}
     if "positions" not in arrays:
@@ -215,7 +215,7 @@ def fit_to_scene(
     """
     (frames, count), cloth, rate = stored.positions.shape[:2], scene.cloth, 1.0 / scene.dt
     stated = fps or stored.fps or rate
-    same = other_mesh or stored.faces is None or _same_faces(stored.faces, cloth.faces)
+    same = other_mesh or stored.faces is None or _are_same_faces(stored.faces, cloth.faces)
     demands = (
         (not other_mesh or stored.faces is not None,
             "has no triangles: add those of its own mesh (faces of an npz, .obj of a point cache)"),
@@ -273,7 +273,7 @@ def _check_place(positions: np.ndarray, expected: np.ndarray, *, ordered: bool) 
         )
 
 
-def _same_faces(theirs: np.ndarray, ours: np.ndarray) -> bool:
+def _are_same_faces(theirs: np.ndarray, ours: np.ndarray) -> bool:
     """Return whether two lists of triangles (F,3) join the same vertices, in any order and winding."""
     one, other = (np.unique(np.sort(faces, axis=1), axis=0) for faces in (theirs, ours))
     return theirs.shape == ours.shape and np.array_equal(one, other)

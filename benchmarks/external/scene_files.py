@@ -82,7 +82,7 @@ def write_scene_files(part: Path, scene: BuiltScene, facts: dict[str, Any]) -> N
     if obstacle is not None:
         _write_arrays(
             part / "obstacle.npz", positions=obstacle.positions, faces=obstacle.faces, fps=1.0 / scene.dt,
-            rest_positions=None if dressed is None else dressed.body.shaped(dressed.betas),
+            rest_positions=None if dressed is None else dressed.body.rest_vertices(dressed.betas),
         )  # fmt: skip
     if dressed is not None:
         write_motion(part, dressed)

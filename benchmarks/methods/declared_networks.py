@@ -21,7 +21,7 @@ from snug.named_recipes import (
     SUPERVISED_VERTICES,
 )
 from snug.recipe import DEFAULT
-from snug.trained import network_name, trained_networks
+from snug.trained import list_networks, network_name
 
 TRAININGS = {
     **{
@@ -34,7 +34,7 @@ TRAININGS = {
     "pbns-springs": Training("pbns", PBNS_SPRINGS),
     **{f"snug-{recipe.name}": Training("snug", recipe) for recipe in (*PAPERS, *ABLATIONS)},
 }
-IN_PACKAGE = trained_networks()
+IN_PACKAGE = list_networks()
 TRAININGS |= {
     f"{name}-packaged": replace(training, packaged=name)
     for name, training in TRAININGS.items()

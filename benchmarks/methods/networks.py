@@ -48,7 +48,7 @@ class CollisionPostProcessing:
 
     def __init__(self, dressed: DressedBody, body_positions: np.ndarray) -> None:
         garment, body = dressed.garment, dressed.body
-        self.patch = Patch(garment.rest_positions, body.shaped(), body.faces)
+        self.patch = Patch(garment.rest_positions, body.rest_vertices(), body.faces)
         self.body = body_positions[:, self.patch.body_vertices].astype(np.float32)
         self._faces: np.ndarray | None = None  # found last, where the next search begins
 

@@ -45,11 +45,11 @@ def energies_of(training: Training) -> Recipe | None:
     return without_inertia(energies) if kind.static else energies
 
 
-def own_energies(entry: MethodEntry) -> Recipe | None:
+def find_energies(entry: MethodEntry) -> Recipe | None:
     """Return the energies of a method's training, see `energies_of`; without one DEFAULT, the scene's.
 
     >>> from benchmarks.methods import find_method
-    >>> own_energies(find_method("snug-paper")).contact_margin, own_energies(find_method("supervised"))
+    >>> find_energies(find_method("snug-paper")).contact_margin, find_energies(find_method("supervised"))
     (0.002, None)
     """
     if entry.declared_in:
@@ -65,13 +65,13 @@ def is_own_reference(entry: MethodEntry) -> bool:
     return entry.module == MODULE
 
 
-def own_reference(entry: MethodEntry) -> MethodEntry | None:
+def find_own_reference(entry: MethodEntry) -> MethodEntry | None:
     """Return the simulation of a method's own energies; None where these are the scene's, or have no minimum.
 
     Nor is there one of the scene's energies without inertia: the quasi-static solution of the scene is
     that.
     """
-    energies = own_energies(entry)
+    energies = find_energies(entry)
     if energies in (None, DEFAULT, STATIC) or is_own_reference(entry):
         return None
     names = [training.recipe.name for training in TRAININGS.values() if energies_of(training) == energies]
@@ -92,6 +92,6 @@ def own_reference(entry: MethodEntry) -> MethodEntry | None:
 
 
 OWN_REFERENCES = tuple(
-    {entry.name: entry for name in TRAININGS if (entry := own_reference(MethodEntry(
+    {entry.name: entry for name in TRAININGS if (entry := find_own_reference(MethodEntry(
         name=name, description="", trained=name, role="network")))}.values()
 )  # fmt: skip

@@ -19,7 +19,7 @@ from snug.recipe import DEFAULT, Recipe
 from snug.training.physics_loss import make_contact, static_terms
 
 
-def of_own_energies(scene: BuiltScene, recipe: Recipe) -> BuiltScene:
+def swap_energies(scene: BuiltScene, recipe: Recipe) -> BuiltScene:
     """Return the scene with the energies that a recipe trains on; the start stays that of its own ones.
 
     Self-contact, which is no energy of a recipe, stays.
@@ -30,7 +30,7 @@ def of_own_energies(scene: BuiltScene, recipe: Recipe) -> BuiltScene:
     return replace(scene, energies=terms, minimised=terms + extras, settle=lambda: scene.start_state)
 
 
-def of_perturbed_start(scene: BuiltScene, shift: float) -> BuiltScene:
+def perturb_start(scene: BuiltScene, shift: float) -> BuiltScene:
     """Return the scene with each free vertex moved by `shift` [m] in a random direction at the start.
 
     The directions are seeded by the shift, so that every run is perturbed differently.
@@ -46,7 +46,7 @@ def of_perturbed_start(scene: BuiltScene, shift: float) -> BuiltScene:
 def make_own_reference(*, models: Path, seed: int, **options: Any) -> Simulation:
     """Make the simulation of the energies of a recipe with these options, the default's in all else."""
     recipe = replace(DEFAULT, **options)
-    change = partial(of_own_energies, recipe=recipe)
+    change = partial(swap_energies, recipe=recipe)
     if "inertia" in recipe.terms:
         return Simulation(change=change)
     return Simulation(STATIC, change=change)
@@ -54,4 +54,4 @@ def make_own_reference(*, models: Path, seed: int, **options: Any) -> Simulation
 
 def make_perturbed_start(*, models: Path, seed: int, shift: float, **options: Any) -> Simulation:
     """Make the reference from a start perturbed by `shift` [m], with options of its steps."""
-    return Simulation(options, partial(of_perturbed_start, shift=shift))
+    return Simulation(options, partial(perturb_start, shift=shift))

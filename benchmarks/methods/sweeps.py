@@ -34,7 +34,7 @@ from collections.abc import Callable
 import numpy as np
 
 from reference_sim.kernels.fast_kernels import SCRATCH_SHAPE, step_terms
-from reference_sim.kernels.kernel_cache import call_each, kernel_argument, njit, with_types_resolved
+from reference_sim.kernels.kernel_cache import call_each, kernel_argument, njit, resolve_types
 from reference_sim.minimise.descent import Descent, Result, Stop
 from reference_sim.potential import Potential
 
@@ -153,7 +153,7 @@ class VertexBlockDescent(SweepSolver):
     def begin(self, guess: np.ndarray) -> tuple[np.ndarray, Callable[[], object]]:
         """Begin at the guess."""
         x = guess.copy()
-        return x, with_types_resolved(sweep_vertices, x, self._free, *self.freeze())
+        return x, resolve_types(sweep_vertices, x, self._free, *self.freeze())
 
 
 def incidence(stencils: np.ndarray, used: np.ndarray, vertices: int) -> tuple[np.ndarray, np.ndarray]:
@@ -187,4 +187,4 @@ class XPBD(SweepSolver):
         x[pins] = guess[pins]
         frozen = (constraints.freeze() for constraints in self._terms.kernels)
         terms = tuple(zip(self._kernels, frozen))
-        return x, with_types_resolved(sweep_constraints, x, self._inverse, terms)
+        return x, resolve_types(sweep_constraints, x, self._inverse, terms)

@@ -42,14 +42,14 @@ class ResidualTransport:
         self._transforms = transforms.numpy()
         self._last: tuple[int, np.ndarray] = (-1, np.zeros((0, 9)))  # a frame, its blended transforms
 
-    def _blended(self, frame: int) -> np.ndarray:  # linear parts (V, 9)
+    def _blend(self, frame: int) -> np.ndarray:  # linear parts (V, 9)
         linear = self._transforms[frame, :, :, :3].reshape(len(self._transforms[frame]), 9)
         return self._weights @ linear
 
-    def carried(self, residual: np.ndarray, frame: int) -> np.ndarray:
+    def carry(self, residual: np.ndarray, frame: int) -> np.ndarray:
         """Return vectors (V, 3) of frame - 1 as they are in `frame`."""
-        before = self._last[1] if self._last[0] == frame - 1 else self._blended(frame - 1)
-        after = self._blended(frame)
+        before = self._last[1] if self._last[0] == frame - 1 else self._blend(frame - 1)
+        after = self._blend(frame)
         self._last = frame, after
         turned = np.empty_like(residual)
         _turn(residual, before, after, turned)
@@ -74,12 +74,12 @@ SKINNING = "skinning"
 SHARE = 0.6  # of the last residual
 
 
-def given_frames(
-    start: Callable[[], Iterator[np.ndarray]], carry: ResidualTransport | None = None
+def make_guess(
+    start: Callable[[], Iterator[np.ndarray]], carrier: ResidualTransport | None = None
 ) -> Callable[[int, np.ndarray], np.ndarray]:
     """Return the function of step and x (V, 3) [m] that gives the first guess (V, 3) [m] of a step from x.
 
-    Steps are asked for in turn, from 1, where `start` begins the frames anew. With `carry`, SHARE of what
+    Steps are asked for in turn, from 1, where `start` begins the frames anew. With `carrier`, SHARE of what
     the solver added to the frame before, carried by the skin, is added to each.
     """
     frames: Iterator[np.ndarray]
@@ -91,7 +91,7 @@ def given_frames(
             frames = start()
             frame = next(frames)  # frame 0 itself is the scene's start, as for every solver
         before, frame = frame, next(frames)
-        return frame if carry is None else frame + SHARE * carry.carried(x - before, step)
+        return frame if carrier is None else frame + SHARE * carrier.carry(x - before, step)
 
     return guess
 
@@ -114,7 +114,7 @@ class WarmStarted(Simulation):
         """Prepare frames and solver. Raises ValueError for several steps a frame: one alone has a start."""
         if scene.substeps > 1:
             raise ValueError(f"scene {scene.name} has {scene.substeps} steps a frame, starts are of one")
-        guess = given_frames(self._frames(scene), self._carry(scene) if self.residual else None)
+        guess = make_guess(self._frames(scene), self._carry(scene) if self.residual else None)
         self.options = {"guess": guess, **self.solver}
         super().prepare(scene)
 

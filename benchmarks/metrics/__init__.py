@@ -30,13 +30,13 @@ MEASUREMENTS = (
 )  # fmt: skip
 
 
-def measured_in(chosen: Sequence[str] | None) -> tuple[Measurements, ...]:
+def pick_measured(chosen: Sequence[str] | None) -> tuple[Measurements, ...]:
     """Return what a scene measures, from the names that it declares; None for all that apply everywhere."""
     return tuple(m for m in MEASUREMENTS if (not m.where_named if chosen is None else m.name in chosen))
 
 
 @cache
-def declared(outside: tuple[str, ...] = ()) -> dict[str, Metric]:
+def list_metrics(outside: tuple[str, ...] = ()) -> dict[str, Metric]:
     """Return every metric by name, also those of files outside.
 
     Raises DeclarationError where two have one name.
@@ -56,7 +56,7 @@ def find_metric(name: str, outside: tuple[str, ...] = ()) -> Metric:
     >>> find_metric("energy/wind").unit
     'J'
     """
-    metrics = declared(outside)
+    metrics = list_metrics(outside)
     if name in metrics:
         return metrics[name]
     family, _, last = name.rpartition("/")

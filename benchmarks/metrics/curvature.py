@@ -40,7 +40,7 @@ FLAT = 1e-6  # spread of H times the cloth's length: less is round-off
 
 def measure(roll_out: RollOut) -> dict[str, float]:
     """Return mean curvature and change of wrinkles over the evaluated frames; empty without an interior."""
-    part = roll_out.kept(series_of).part(roll_out.judged)
+    part = roll_out.get(series_of).part(roll_out.judged)
     if not part.area.any():
         return {}
     values = {"curvature/mean": float(part.means().mean())}
@@ -53,8 +53,8 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
 
     Empty where the mesh has no interior vertex.
     """
-    frames = roll_out.judged_beside(reference.positions)
-    ours, theirs = roll_out.kept(series_of).part(frames), reference.kept(series_of).part(frames)
+    frames = roll_out.match_frames(reference.positions)
+    ours, theirs = roll_out.get(series_of).part(frames), reference.get(series_of).part(frames)
     if not theirs.area.any():
         return {}
     return {
@@ -66,7 +66,7 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
 
 def series(roll_out: RollOut) -> dict[str, Floats]:
     """Return the mean curvature of each frame, (T,) [1/m]."""
-    return {"curvature/mean": roll_out.kept(series_of).means()}
+    return {"curvature/mean": roll_out.get(series_of).means()}
 
 
 def series_of(roll_out: RollOut) -> CurvatureSeries:
@@ -106,9 +106,9 @@ def mean_curvature(x: Vertices, faces: Faces) -> tuple[Floats, Floats]:
     voronoi = (weighted.sum(-1, keepdims=True) - weighted) / 8.0
     obtuse = dots < 0.0
     share = np.where(obtuse, 0.25, 0.125) * doubled[:, None]
-    areas_of_corners = np.where(obtuse.any(-1, keepdims=True), share, voronoi)
+    areas = np.where(obtuse.any(-1, keepdims=True), share, voronoi)
 
-    area = np.asarray(np.bincount(faces.ravel(), areas_of_corners.ravel(), count), dtype=float)
+    area = np.asarray(np.bincount(faces.ravel(), areas.ravel(), count), dtype=float)
     pulls = cotangents[..., None] * opposite
     after, before = np.roll(faces, -1, axis=1).ravel(), np.roll(faces, -2, axis=1).ravel()
     laplacian = np.empty((count, 3))  # sum_j (cot a_ij + cot b_ij) (x_i - x_j)
@@ -128,7 +128,7 @@ class CurvatureSeries:
 
     def means(self) -> Floats:
         """Return the area-weighted mean over interior vertices, (T,) [1/m]."""
-        return _weighted(self.curvature, self.area)
+        return _average(self.curvature, self.area)
 
     def part(self, frames: slice) -> CurvatureSeries:
         """Return the series of these frames."""
@@ -147,10 +147,10 @@ def curvature_series(positions: Positions, faces: Faces) -> CurvatureSeries:
 
 def curvature_error(series: CurvatureSeries, reference: CurvatureSeries) -> Floats:
     """Return the mean |H - H_ref| of each frame, (T,) [1/m], by the areas of the reference."""
-    return _weighted(np.abs(series.curvature - reference.curvature), reference.area)
+    return _average(np.abs(series.curvature - reference.curvature), reference.area)
 
 
-def _weighted(values: Floats, weights: Floats) -> Floats:
+def _average(values: Floats, weights: Floats) -> Floats:
     total = weights.sum(1)
     return np.divide((values * weights).sum(1), total, out=np.zeros(len(total)), where=total > 0.0)
 

@@ -123,7 +123,7 @@ class HemMotion:
     quasi_static: Array  # (T,V,3) [m], world
     first: int = 0  # frame that is judged
 
-    def of(self, positions: Array) -> Array:
+    def view_hem(self, positions: Array) -> Array:
         """Return the hem (T,H,3) [m] of positions (T,V,3) [m] in the axes of the root."""
         frames = len(positions)
         from_root = positions[:, self.hem] - self.origins[:frames, None]
@@ -139,8 +139,8 @@ class HemMotion:
             return {}
         frames = slice(self.first, last)
         answers = (positions, self.simulated, self.quasi_static)
-        moving, simulated, quiet = (self.of(answer[:last])[frames] for answer in answers)
-        rest = quiet if static is None else self.of(static[:last])[frames]
+        moving, simulated, quiet = (self.view_hem(answer[:last])[frames] for answer in answers)
+        rest = quiet if static is None else self.view_hem(static[:last])[frames]
         part, reference = dynamic_part(moving, rest), dynamic_part(simulated, quiet)
         gain, lag = response(moving, rest, self.axes[frames])
         values = (correlation(part, reference), amplitude(part, reference), gain, lag)
@@ -153,7 +153,7 @@ def measure(roll_out: RollOut) -> dict[str, float]:
     static = group.quasi_static if roll_out is group.reference else roll_out.quasi_static
     values: dict[str, float] = compare(roll_out, roll_out) if roll_out is group.reference else {}
     if static is not None:
-        frames = roll_out.judged_beside(static)
+        frames = roll_out.match_frames(static)
         values["dynamics/quasi_static_difference"] = rms(x[frames], static[frames])
     return values
 
@@ -163,7 +163,7 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
 
     Without a quasi-static solution of its own the numbers are left out that it enters.
     """
-    hem, x, static = reference.kept(hem_motion), roll_out.positions, roll_out.quasi_static
+    hem, x, static = reference.get(hem_motion), roll_out.positions, roll_out.quasi_static
     if hem is None:
         return {}
     values: dict[str, float] = {}

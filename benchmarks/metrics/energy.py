@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from reference_sim.potential import Potential
 
 
-def copied_terms(scene: BuiltScene) -> list[Energy]:
+def copy_terms(scene: BuiltScene) -> list[Energy]:
     """Copy the terms that the scene declares, and inertia, to be prepared for one trajectory alone.
 
     What one of them knows of another is the other's copy. Arrays are shared with the scene's.
@@ -47,7 +47,7 @@ def freeze_step(
     frame: int,
     guess: Vertices | None = None,
 ) -> Vertices:
-    """Freeze the potential of `copied_terms` for the step that ended at `frame`; return its first guess.
+    """Freeze the potential of `copy_terms` for the step that ended at `frame`; return its first guess.
 
     Any frame from 1 on may be jumped to: the step before is prepared first where a term remembers it.
     Contact planes are searched at `guess`, by default the simulator's.
@@ -77,7 +77,7 @@ def first_guess(scene: BuiltScene, previous: Vertices, velocity: Floats, frame: 
     if scene.obstacle is None:
         guess = previous + scene.dt * velocity
     else:
-        guess = scene.obstacle.transported(previous, frame, scene.cloth.rest_positions)
+        guess = scene.obstacle.transport(previous, frame, scene.cloth.rest_positions)
     pins = scene.cloth.pins
     guess[pins] = previous[pins] if scene.pin_positions is None else scene.pin_positions(frame)
     return np.ascontiguousarray(guess)
@@ -91,7 +91,7 @@ def energy_series(scene: BuiltScene, trajectories: Sequence[Positions]) -> list[
 
     Frames are the outer loop: what belongs to a frame alone, as an obstacle's search tree, is made once.
     """
-    copies = [copied_terms(scene) for _ in trajectories]
+    copies = [copy_terms(scene) for _ in trajectories]
     tables = [{name: np.zeros(len(positions)) for name in scene.terms} for positions in trajectories]
     for frame in range(max(map(len, trajectories), default=0)):
         for positions, terms, series in zip(trajectories, copies, tables):
@@ -133,10 +133,10 @@ def series(roll_out: RollOut) -> dict[str, Floats]:
 
 def energies(roll_out: RollOut) -> dict[str, Floats]:
     """Return term -> (T,) [J], and "total"; computed for all roll-outs of the scene at once."""
-    return roll_out.group.kept(_of_all)[roll_out]
+    return roll_out.group.get(_measure)[roll_out]
 
 
-def _of_all(group: SceneRollOuts) -> dict[RollOut, dict[str, Floats]]:
+def _measure(group: SceneRollOuts) -> dict[RollOut, dict[str, Floats]]:
     positions = [roll_out.positions for roll_out in group.roll_outs]
     return dict(zip(group.roll_outs, energy_series(group.scene, positions)))
 

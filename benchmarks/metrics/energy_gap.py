@@ -29,7 +29,7 @@ import numpy as np
 
 from benchmarks.metric import Estimate, Measurements, metrics_of
 from benchmarks.metrics.curvature import boundary_mask, mean_curvature
-from benchmarks.metrics.energy import copied_terms, freeze_step
+from benchmarks.metrics.energy import copy_terms, freeze_step
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -49,7 +49,7 @@ MEANS = ("gap/energy", "gap/local", "gap/refrozen", "step/distance", "step/curva
 def measure(roll_out: RollOut) -> dict[str, float | Estimate]:
     """Return gaps, one-step distances and the gradient left, of the sampled frames."""
     group = roll_out.group
-    scale, values = group.kept(gap_scale), roll_out.kept(judge_steps).metrics()
+    scale, values = group.get(gap_scale), roll_out.get(judge_steps).metrics()
     if scale is None or not values:
         return values
     gap = values["gap/energy"]
@@ -61,7 +61,7 @@ def measure(roll_out: RollOut) -> dict[str, float | Estimate]:
 
 def series(roll_out: RollOut) -> dict[str, NDArray[np.float32]]:
     """Return step/vertices (T,V) [mm]: distance of each vertex to y_t; nan in other than sampled frames."""
-    away = roll_out.kept(judge_steps).away
+    away = roll_out.get(judge_steps).away
     values = np.full(roll_out.positions.shape[:2], np.nan, dtype=np.float32)
     for frame, distances in away.items():
         values[frame] = distances
@@ -71,14 +71,14 @@ def series(roll_out: RollOut) -> dict[str, NDArray[np.float32]]:
 def judge_steps(roll_out: RollOut) -> Optimality:
     """Solve the sampled steps of a roll-out again."""
     group = roll_out.group
-    scale = group.kept(gap_scale)
+    scale = group.get(gap_scale)
     return optimality(roll_out.scene, roll_out.positions, samples=group.gap_samples, scale=scale)
 
 
 def gap_scale(group: SceneRollOuts) -> float | None:
     """Return the scale [J] of the scene; None without a reference that has an evaluated frame."""
     reference = group.reference
-    frames = [] if reference is None else list(_judged(group.scene, reference.positions))
+    frames = [] if reference is None else list(_pick_frames(group.scene, reference.positions))
     if reference is None or not frames:
         return None
     potential, bare = _potential(group.scene), group.scene.skinned
@@ -132,7 +132,7 @@ def optimality(
 
     # No scale serves where the reference lies above the first guess, or has no energy.
     negligible = NEGLIGIBLE * scale if scale is not None and scale > 0.0 else 0.0
-    frames = _judged(scene, positions)
+    frames = _pick_frames(scene, positions)
     numbers, potential = Optimality(frames=len(frames)), _potential(scene)
     values = numbers.values
     solver = LBFGS(potential, max_iterations=ITERATIONS)
@@ -167,7 +167,7 @@ def optimality(
     return numbers
 
 
-def _judged(scene: BuiltScene, positions: Positions) -> range:
+def _pick_frames(scene: BuiltScene, positions: Positions) -> range:
     """Return the evaluated frames; none where a frame is not one time step."""
     return range(scene.warm_up, len(positions) if scene.substeps == 1 else 0)
 
@@ -175,7 +175,7 @@ def _judged(scene: BuiltScene, positions: Positions) -> range:
 def _potential(scene: BuiltScene) -> Potential:
     from reference_sim.potential import Potential  # loads numba
 
-    return Potential(copied_terms(scene))
+    return Potential(copy_terms(scene))
 
 
 def spread_evenly(frames: range) -> Iterator[int]:

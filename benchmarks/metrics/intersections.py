@@ -81,11 +81,11 @@ def swept_crossings(before: Vertices, after: Vertices, faces: Faces) -> int | No
 def _meeting(test: Any, before: Vertices, after: Vertices, quadruples: list[tuple[int, ...]]) -> int:
     """Return how many of the quadruples of vertices meet, by ipctk's test."""
     chosen = np.array(quadruples, dtype=np.int64).reshape(-1, 4)
-    chosen = chosen[coplanar_on_the_way(before[chosen], after[chosen])]
+    chosen = chosen[find_coplanar(before[chosen], after[chosen])]
     return sum(test(*a, *b)[0] for a, b in zip(before[chosen], after[chosen]))
 
 
-def coplanar_on_the_way(before: Floats, after: Floats) -> NDArray[np.bool_]:
+def find_coplanar(before: Floats, after: Floats) -> NDArray[np.bool_]:
     """Return for which of N quadruples of points (N,4,3) [m] a plane may hold all four at once, (N,).
 
     Their volume is cubic in time: where its four Bernstein coefficients have one sign, it has no root.

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from benchmarks.methods.own_energies import STATIC, is_own_reference, own_energies, own_reference
+from benchmarks.methods.own_energies import STATIC, find_energies, find_own_reference, is_own_reference
 from benchmarks.metric import Measurements, metrics_of
 from benchmarks.metrics.energy import energies, energy_series
 from benchmarks.results.row import USABLE
@@ -28,39 +28,39 @@ NAME = "own_excess/total"
 
 def measure(roll_out: RollOut) -> dict[str, float]:
     """Return the excess where the energies are not the scene's; 0 of what is a minimiser of its own ones."""
-    group, recipe = roll_out.group, own_energies(roll_out.entry)
+    group, recipe = roll_out.group, find_energies(roll_out.entry)
     bare = group.scene.skinned
     if bare is not None and (roll_out is group.reference or is_own_reference(roll_out.entry)):
         return {NAME: 0.0}
-    minimum = None if recipe in (None, DEFAULT) else _least(roll_out, recipe)
+    minimum = None if recipe in (None, DEFAULT) else _find_minimum(roll_out, recipe)
     if bare is None or recipe is None or minimum is None:
         return {}
-    from benchmarks.methods.reference_variants import of_own_energies  # loads torch
+    from benchmarks.methods.reference_variants import swap_energies  # loads torch
 
-    terms = energy_series(of_own_energies(group.scene, recipe), [roll_out.positions, minimum, bare])
+    terms = energy_series(swap_energies(group.scene, recipe), [roll_out.positions, minimum, bare])
     series = [e["total"] if "inertia" in recipe.terms else e["total"] - e["inertia"] for e in terms]
-    return _share(series, roll_out.judged_beside(minimum))
+    return _share(series, roll_out.match_frames(minimum))
 
 
 def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
     """Return the excess over a reference of the scene's energies."""
-    bare = roll_out.group.kept(_of_skinning)
-    if bare is None or own_energies(roll_out.entry) != DEFAULT:
+    bare = roll_out.group.get(_measure_skinning)
+    if bare is None or find_energies(roll_out.entry) != DEFAULT:
         return {}
     series = [energies(roll_out)["total"], energies(reference)["total"], bare]
-    return _share(series, roll_out.judged_beside(reference.positions))
+    return _share(series, roll_out.match_frames(reference.positions))
 
 
-def _least(roll_out: RollOut, recipe: Recipe) -> Positions | None:
+def _find_minimum(roll_out: RollOut, recipe: Recipe) -> Positions | None:
     """Return the minimiser (T,V,3) [m] of these energies; None where no simulation of them has ended well."""
     if recipe == STATIC:
         return roll_out.group.quasi_static
-    entry = own_reference(roll_out.entry)
+    entry = find_own_reference(roll_out.entry)
     others = (other for other in roll_out.group.roll_outs if entry and other.entry.name == entry.name)
     return next((other.positions for other in others if other.status in USABLE), None)
 
 
-def _of_skinning(group: SceneRollOuts) -> Floats | None:
+def _measure_skinning(group: SceneRollOuts) -> Floats | None:
     bare = group.scene.skinned
     return None if bare is None else energy_series(group.scene, [bare])[0]["total"]
 

@@ -22,7 +22,7 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
     """Return distances [mm] of the same vertices to the reference's; empty of another mesh."""
     if roll_out.entry.other_mesh:
         return {}
-    frames = roll_out.judged_beside(reference.positions)
+    frames = roll_out.match_frames(reference.positions)
     x, y = roll_out.positions[frames], reference.positions[frames]
     return {
         "distance/rms": rms(x, y),
@@ -52,10 +52,10 @@ def measure(roll_out: RollOut) -> dict[str, float]:
 def inside_of(roll_out: RollOut) -> Penetration:
     """Return the penetration of a roll-out; that of all roll-outs of the scene's mesh is computed at once."""
     group = roll_out.group
-    return group.kept(_of_all)[roll_out] if roll_out in group.roll_outs else _inside([roll_out])[roll_out]
+    return (group.get(_measure) if roll_out in group.roll_outs else _inside([roll_out]))[roll_out]
 
 
-def _of_all(group: SceneRollOuts) -> dict[RollOut, Penetration]:
+def _measure(group: SceneRollOuts) -> dict[RollOut, Penetration]:
     return _inside(group.roll_outs)
 
 

@@ -45,7 +45,7 @@ def measure_body(roll_out: RollOut) -> dict[str, float]:
     scene, frames = roll_out.scene, len(roll_out.positions)
     if roll_out.entry.role != "reference" or scene.dressed is None or scene.obstacle is None:
         return {}
-    faces, rest = scene.obstacle.faces, scene.dressed.body.shaped(scene.dressed.betas)
+    faces, rest = scene.obstacle.faces, scene.dressed.body.rest_vertices(scene.dressed.betas)
     at_rest = inside_itself(rest, faces)  # eyes in their sockets
     samples = np.unique(np.linspace(scene.warm_up, frames - 1, SAMPLED_FRAMES).round().astype(int))
     share = [(inside_itself(scene.obstacle.at(frame), faces) & ~at_rest).mean() for frame in samples]

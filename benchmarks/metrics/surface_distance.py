@@ -32,7 +32,7 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
 
     Empty of a cloth that is lost, or has no area in some frame.
     """
-    common = roll_out.judged_beside(reference.positions)
+    common = roll_out.match_frames(reference.positions)
     x, y = roll_out.positions[common], reference.positions[common]
     if not len(x) or np.abs(x).max() > LOST:
         return {}

@@ -10,13 +10,13 @@ from fnmatch import fnmatchcase
 from benchmarks.assets import Inputs
 from benchmarks.external.roll_out_files import PLACE
 from benchmarks.method import MethodEntry
-from benchmarks.methods.own_energies import own_reference
-from benchmarks.metrics import measured_in
+from benchmarks.methods.own_energies import find_own_reference
+from benchmarks.metrics import pick_measured
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.plan.study import Part, Study, StudyError, nearest
 from benchmarks.scene import Scene
-from benchmarks.scenes import all_scenes, further_scenes
+from benchmarks.scenes import all_scenes, dress_scenes
 from benchmarks.validation.case import METHOD, Case
 from snug.motion.library import LIBRARY
 
@@ -48,13 +48,13 @@ def choose_cells(read: ReadStudy) -> tuple[tuple[Cell, ...], tuple[Case, ...]]:
     for name, scenes in scenes_of_parts(read).items():
         methods = matching(read.methods, study.methods or study.parts[name].methods)
         pairs = ((read.scenes[scene], read.methods[method]) for scene in scenes for method in methods)
-        for scene, entry in (pair for pair in pairs if pair[1].meant_for(pair[0])):
+        for scene, entry in (pair for pair in pairs if pair[1].is_meant_for(pair[0])):
             one_seed = bool(matching([entry.name], study.one_seed))
             for seed in study.seeds[: 1 if one_seed else None] if entry.seeded else (0,):
                 key = (scene.name, entry.name, seed)
                 before = chosen[key].suites if key in chosen else ()
                 chosen[key] = Cell(scene.at(study.sizes), entry, seed, (*before, name))
-    chosen |= own_references(chosen)
+    chosen |= find_own_references(chosen)
     cases = tuple(_cases(study, read.cases))
     if not (chosen or cases):
         raise StudyError(
@@ -67,18 +67,18 @@ def choose_cells(read: ReadStudy) -> tuple[tuple[Cell, ...], tuple[Case, ...]]:
     order = {name: place for place, name in enumerate((*read.methods, *study.rollouts))}
     unsorted = (*chosen.values(), *stored)
     ordered = sorted(unsorted, key=lambda c: (places[c.scene.name], order.get(c.method, 0), c.seed))
-    cells = _timed_once(ordered)
+    cells = _time_once(ordered)
     _check_user_scenes([cell.scene for cell in cells], read.motions)
     return tuple(cells), cases
 
 
-def own_references(chosen: Mapping[tuple[str, str, int], Cell]) -> dict[tuple[str, str, int], Cell]:
+def find_own_references(chosen: Mapping[tuple[str, str, int], Cell]) -> dict[tuple[str, str, int], Cell]:
     """Return the simulations of methods' own energies, in scenes where the reference runs and these count."""
     compared = {c.scene.name for c in chosen.values() if c.entry.role == "reference"}
     added = {}
     for cell in chosen.values():
-        counts = any(m.name == "own_energies" for m in measured_in(cell.scene.metrics))
-        entry = own_reference(cell.entry) if counts and cell.scene.name in compared else None
+        counts = any(m.name == "own_energies" for m in pick_measured(cell.scene.metrics))
+        entry = find_own_reference(cell.entry) if counts and cell.scene.name in compared else None
         if entry and (key := (cell.scene.name, entry.name, 0)) not in chosen:
             added[key] = replace(cell, entry=entry, seed=0)
     return added
@@ -105,16 +105,16 @@ def scenes_of_parts(read: ReadStudy) -> dict[str, list[str]]:
     A scene that field `scenes` names and no part lists is met in the first part with a scene of its kind.
     """
     scenes, patterns, parts = read.scenes, read.study.scenes, read.study.parts
-    usual = {name: matching(scenes, expanded(part.scenes, read.motions)) for name, part in parts.items()}
+    usual = {name: matching(scenes, expand(part.scenes, read.motions)) for name, part in parts.items()}
     if not patterns:
         return usual
-    extras = {n: matching(scenes, expanded(p.optional_scenes, read.motions)) for n, p in parts.items()}
+    extras = {n: matching(scenes, expand(p.optional_scenes, read.motions)) for n, p in parts.items()}
     listed = {name for group in (usual, extras) for names in group.values() for name in names}
     chosen = {n: matching(dict.fromkeys((*usual[n], *extras[n])), patterns) for n in parts}
     strays = [p for p in patterns if p in scenes or p.startswith("!") or not matching(listed, [p])]
     for name in matching(scenes, strays) if set(strays) - listed else ():
         scene = scenes[name]
-        of_split = scene.dressed and scene.motion in read.motions.measured_of(scene.garment)
+        of_split = scene.dressed and scene.motion in read.motions.pick_motions(scene.garment)
         homes = [part for part in parts if scene.part in {scenes[n].part for n in usual[part]}]
         homes += list(parts) if name in patterns else []
         if name not in listed and homes and (name in patterns or of_split):
@@ -122,29 +122,29 @@ def scenes_of_parts(read: ReadStudy) -> dict[str, list[str]]:
     return chosen
 
 
-def expanded(patterns: Sequence[str], motions: Motions) -> list[str]:
+def expand(patterns: Sequence[str], motions: Motions) -> list[str]:
     """Return the patterns of a part with garment and motions of a run in their places."""
-    expansions = []
+    expanded = []
     for pattern in patterns:
         pattern = pattern.replace("{garment}", motions.garments[0].garment)
         if not (place := PLACES.search(pattern)):
-            expansions.append(pattern)
+            expanded.append(pattern)
             continue
         garment = pattern.partition("/")[0].removeprefix("!")
         roles = motions.roles(dynamic=True) if place[1] == "swinging" else motions.by_role(garment)
         names = roles[motions.split][: motions.few]
         if place[2]:
             names = names[int(place[2]) - 1 : int(place[2])]
-        expansions += [pattern.replace(place[0], name) for name in names]
-    return expansions
+        expanded += [pattern.replace(place[0], name) for name in names]
+    return expanded
 
 
-def _timed_once(cells: Sequence[Cell]) -> list[Cell]:
+def _time_once(cells: Sequence[Cell]) -> list[Cell]:
     """Return the cells; of a garment's whole motions the first alone keeps its costs.
 
     Timed cells run one by one, the others side by side. What a frame costs, one motion tells.
     """
-    untimed = tuple(m.name for m in measured_in(None) if m.name != "cost")
+    untimed = tuple(m.name for m in pick_measured(None) if m.name != "cost")
     begun: dict[str, Scene] = {}
     result = []
     for cell in cells:
@@ -186,7 +186,7 @@ def _check_words(read: ReadStudy) -> None:
     # Scenes that tailor a T-shirt themselves are none of a run with another garment.
     scenes = list({**read.scenes, **all_scenes((), ())})
     for name, part in study.parts.items():
-        patterns = expanded((*part.scenes, *part.optional_scenes), read.motions)
+        patterns = expand((*part.scenes, *part.optional_scenes), read.motions)
         check(f"parts.{name}.scenes", scenes, patterns)
         check(f"parts.{name}.methods", methods, part.methods)
         check(f"parts.{name}.cases", [*cases, *SETS], part.cases)
@@ -194,7 +194,7 @@ def _check_words(read: ReadStudy) -> None:
 
 def _check_user_scenes(scenes: Sequence[Scene], motions: Motions) -> None:
     """Raise StudyError for a start or a motion that a user's scene names and nobody knows."""
-    starts = (*further_scenes(motions.garments[0].garment), *scenes)
+    starts = (*dress_scenes(motions.garments[0].garment), *scenes)
     settling = [scene.name for scene in starts if scene.simulated and not scene.start_of]
     for scene in (scene for scene in scenes if scene.declared_in):
         for field, names in (("start_of", settling), ("motion", [*motions.files, *LIBRARY])):

@@ -6,7 +6,7 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 from benchmarks.plan.study import Study, StudyError, nearest
-from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, of_garment
+from benchmarks.scenes import GARMENT_SCENES, GarmentScenes, find_garment
 from snug.motion.library import (
     DYNAMIC_TEST,
     DYNAMIC_VALIDATION,
@@ -57,9 +57,9 @@ class Motions:
 
     def by_role(self, garment: str) -> dict[str, tuple[str, ...]]:
         """Return role -> names of a garment's motions."""
-        return self.roles(dynamic=of_garment(garment, self.garments).dynamic)
+        return self.roles(dynamic=find_garment(garment, self.garments).dynamic)
 
-    def measured_of(self, garment: str) -> tuple[str, ...]:
+    def pick_motions(self, garment: str) -> tuple[str, ...]:
         """Return the names of a garment's motions of the split."""
         return self.by_role(garment)[self.split][: self.few]
 

@@ -68,7 +68,7 @@ def make_parser() -> argparse.ArgumentParser:
     add("study", nargs="?", default="default", metavar="STUDY",
         help="name of a study, or path of your own; :PART,... behind it for some parts (default: default)"
     )  # fmt: skip
-    add_study_options(parser, tuple(SHORT))
+    add_options(parser, tuple(SHORT))
     add("-o", "--out", metavar="DIR", help="folder of the run (default: a new one under reports/runs/)")
     add("--retry", action="store_true", help="repeat what failed in the folder, too")
     add("--fresh", action="store_true", help="reuse nothing from the folder")
@@ -85,7 +85,7 @@ def make_parser() -> argparse.ArgumentParser:
     return parser
 
 
-def add_study_options(parser: argparse.ArgumentParser, short: Sequence[str] = OF_SCENES) -> None:
+def add_options(parser: argparse.ArgumentParser, short: Sequence[str] = OF_SCENES) -> None:
     """Add --set and the short forms of these fields; those of a scene are the same in every command."""
     texts = attributes_of(Study)
     parser.add_argument("--set", action="append", default=[], metavar="FIELD=VALUE", dest="settings",
@@ -100,7 +100,7 @@ def add_study_options(parser: argparse.ArgumentParser, short: Sequence[str] = OF
 
 
 def study_of(options: argparse.Namespace, name: str = "full") -> Study:
-    """Return the study of that name with the options of `add_study_options`. Raises ValueError."""
+    """Return the study of that name with the options of `add_options`. Raises ValueError."""
     return read_study(name, [*_tables(options), *map(parse_setting, options.settings)])
 
 

@@ -9,13 +9,13 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from benchmarks.assets import Assets, Inputs, embedded_motions, open_assets, read_inputs
+from benchmarks.assets import Assets, Inputs, make_motions, open_assets, read_inputs
 from benchmarks.declarations import by_name
 from benchmarks.external.roll_out_files import MODULE as STORED
-from benchmarks.method import Training, installed
+from benchmarks.method import Training, is_installed
 from benchmarks.methods import METHODS
 from benchmarks.methods.declared_networks import TRAININGS
-from benchmarks.metrics import declared
+from benchmarks.metrics import list_metrics
 from benchmarks.plan import user_files
 from benchmarks.plan.cell import Cell, TaskId
 from benchmarks.plan.choose_cells import ReadStudy, choose_cells
@@ -128,11 +128,11 @@ class Plan:
         read, train = self.inputs.motions, self.motions.train
         names = [scene.motion for scene in self.scenes if scene.dressed]
         for garment in self.garments:
-            names += self.motions.measured_of(garment)
+            names += self.motions.pick_motions(garment)
         names += train if self.networks else ()
         names = list(dict.fromkeys(names))
         motions = [read[name] for name in names if name in read]
-        motions += embedded_motions(name for name in names if name not in read)
+        motions += make_motions(name for name in names if name not in read)
         return open_assets(self.study.sizes, motions, self.garments, inputs=self.inputs, training=train)
 
 
@@ -246,7 +246,7 @@ def read_files(study: Study, scenes: Sequence[Scene] = ()) -> ReadStudy:
         raise StudyError(
             f"{garment.path}: the project has scenes of that name: give the file another name"
         )
-    if self_contact and not installed("ipctk"):
+    if self_contact and not is_installed("ipctk"):
         raise StudyError("self_contact: needs the package ipctk: pip install ipctk")
     inputs = read_inputs(study.body, garment, study.motions, study.motion_files)
     motions = split_motions(study, inputs.motions)
@@ -272,7 +272,7 @@ def choose_metrics(study: Study) -> tuple[str, ...]:
     for name in set(names) - {metric.name for metric in metrics}:
         raise StudyError(f"metrics: {name}: is no file; those of the project are measured without it")
     homes = tuple(dict.fromkeys(metric.declared_in for metric in metrics))
-    declared(homes)  # each name stands once
+    list_metrics(homes)  # each name stands once
     return homes
 
 

@@ -177,7 +177,7 @@ def read_study(word: str = "full", options: Sequence[Table] = ()) -> Study:
     name, _, chosen = word.partition(":")
     table = _fields_of(find_study(name))
     for entry in options:
-        table = _merged(table, _with_tables(entry))
+        table = _merge(table, _with_tables(entry))
     if chosen:
         parts, names = table.get("parts", {}), [part for part in chosen.split(",") if part]
         for part in names:
@@ -211,7 +211,7 @@ def find_study(name: str) -> Path:
     )
 
 
-def located(message: str, study: str, options: Sequence[str]) -> str:
+def locate(message: str, study: str, options: Sequence[str]) -> str:
     """Return the message of a faulty field behind the file and line of the study that give it.
 
     A field that the words of the command line give has none.
@@ -300,21 +300,21 @@ def _fields_of(path: Path, chain: tuple[Path, ...] = ()) -> Table:
         raise StudyError(f"{path}: is like itself")
     table = _with_tables(_read_table(path))
     if path.parent != PACKAGED:
-        table = _beside(path.parent, "", table)
+        table = _resolve(path.parent, "", table)
     if "like" not in table:
         return table
     like = str(table.pop("like"))
     sibling = path.parent / like
     base = sibling if sibling.is_file() else find_study(str(sibling) if sibling.is_dir() else like)
-    return _merged(_fields_of(base, (*chain, path)), table)
+    return _merge(_fields_of(base, (*chain, path)), table)
 
 
-def _beside(folder: Path, name: str, value: Any) -> Any:
+def _resolve(folder: Path, name: str, value: Any) -> Any:
     """Return the value of a field with its paths relative to where `folder` is."""
     if isinstance(value, Mapping):
-        return {name: _beside(folder, name, held) for name, held in value.items()}
+        return {name: _resolve(folder, name, held) for name, held in value.items()}
     if isinstance(value, list):
-        return [_beside(folder, name, held) for held in value]
+        return [_resolve(folder, name, held) for held in value]
     is_path = isinstance(value, str) and (name in PATHS or value.endswith(".py")) and value != LIBRARY
     return str(folder / value) if is_path else value
 
@@ -328,12 +328,12 @@ def _with_tables(table: Table) -> dict[str, Any]:
     return table
 
 
-def _merged(below: Table, above: Table) -> dict[str, Any]:
+def _merge(below: Table, above: Table) -> dict[str, Any]:
     """Return the fields of both; tables are joined, all else is that of `above`."""
     merged = {**below, **above}
     for name, value in above.items():
         if isinstance(value, Mapping) and isinstance(below.get(name), Mapping):
-            merged[name] = _merged(below[name], value)
+            merged[name] = _merge(below[name], value)
     return merged
 
 
@@ -357,7 +357,7 @@ def _dataclass_of(kind: Any, table: Any, field: tuple[str, ...] = ()) -> Any:
             _refuse(field, f"{f.name} is absent: give it")
     hints = get_type_hints(kind)
     try:
-        table = _merged(asdict(find_preset(base)), table) if base else table
+        table = _merge(asdict(find_preset(base)), table) if base else table
         return kind(**{name: _value_of(hints[name], table[name], (*field, name)) for name in table})
     except StudyError:
         raise

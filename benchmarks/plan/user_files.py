@@ -13,13 +13,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, NamedTuple
 
-from benchmarks.declarations import DeclarationError, by_name, demand_that_it_is, load, raised_at
+from benchmarks.declarations import DeclarationError, by_name, demand_import, load, raised_at
 from benchmarks.method import MethodEntry
 from benchmarks.methods.declared_networks import TRAININGS
 from benchmarks.metric import Metric
 from benchmarks.metrics import MEASUREMENTS
 from benchmarks.plan.study import Part, Study
-from benchmarks.provenance import digest, find_module, imported_beside
+from benchmarks.provenance import digest, find_imports, find_module
 from benchmarks.scene import Scene
 from benchmarks.validation.case import Case, cases_of
 
@@ -66,7 +66,7 @@ def declarations_of(study: Study) -> tuple[Study, list[Scene], list[MethodEntry]
     """
     declared: dict[Kind, list[Any]] = {SCENES: [], METHODS: [], CASES: []}
 
-    def named(part: Study | Part, suite: str = "") -> Any:
+    def collect(part: Study | Part, suite: str = "") -> Any:
         changes: dict[str, Any] = {}
         for field, kind in ((field, kind) for field, kind in OF_FIELD.items() if hasattr(part, field)):
             changes[field], entries = resolve(kind, getattr(part, field))
@@ -74,8 +74,8 @@ def declarations_of(study: Study) -> tuple[Study, list[Scene], list[MethodEntry]
             declared[kind] += [entry for entry in entries if entry not in declared[kind]]
         return replace(part, **changes)
 
-    parts = {name: named(part, name) for name, part in study.parts.items()}
-    study = replace(named(study), parts=parts)
+    parts = {name: collect(part, name) for name, part in study.parts.items()}
+    study = replace(collect(study), parts=parts)
     check_networks(declared[METHODS])
     return study, declared[SCENES], declared[METHODS], declared[CASES]
 
@@ -112,7 +112,7 @@ def entries_of(kind: Kind, home: str) -> list[Any]:
     if kind is METRICS:
         entries = [replace(entry, declared_in=home) for entry in items]
     else:
-        entries = [_placed(kind, entry, home) for entry in items]
+        entries = [_complete(kind, entry, home) for entry in items]
     needs_function = home in {getattr(entry, "module", home) for entry in entries}
     _demand(
         not needs_function or hasattr(module, kind.function), f"{home}: has no function {kind.function}"
@@ -120,7 +120,7 @@ def entries_of(kind: Kind, home: str) -> list[Any]:
     return entries
 
 
-def _placed(kind: Kind, entry: Any, home: str) -> Any:
+def _complete(kind: Kind, entry: Any, home: str) -> Any:
     """Return the entry with the file that declares it, and all paths made absolute."""
     place, folder = f"{home}: {kind.word[:-1]} '{entry.name}'", Path(find_module(home)).parent
     _demand(NAME.fullmatch(entry.name),
@@ -157,6 +157,6 @@ def import_file(home: str) -> ModuleType:
         fault = error.msg if isinstance(error, SyntaxError) else f"{type(error).__name__}: {error}"
         place = raised_at(error, home) or home
         raise DeclarationError(f"{place}: {' '.join(fault.split())}") from None
-    for name, path in imported_beside(home).items():  # two folders may have a utils.py each
-        demand_that_it_is(name, path)
+    for name, path in find_imports(home).items():  # two folders may have a utils.py each
+        demand_import(name, path)
     return module

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from reference_sim.given_files import regular
+from reference_sim.given_files import demand_file
 
 
 class ResultsError(ValueError):
@@ -20,7 +20,7 @@ class ResultsError(ValueError):
 def read_json(path: Path) -> dict[str, Any]:
     """Read the JSON object in a file. Raises ResultsError."""
     try:
-        value = json.loads(regular(path).read_text(encoding="utf-8"))
+        value = json.loads(demand_file(path).read_text(encoding="utf-8"))
     except FileNotFoundError:
         raise ResultsError(f"{path}: no such file; is this the folder of a run?") from None
     except (ValueError, RecursionError, OSError) as error:  # also for a number of 5000 digits

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from benchmarks.provenance import digest_of_file
 from benchmarks.results.row import COLUMNS, ResultsError, Row, cells_to_row, read_json, row_to_cells
 from reference_sim.files.atomic_files import replacing
-from reference_sim.given_files import regular
+from reference_sim.given_files import demand_file
 
 if TYPE_CHECKING:
     import numpy as np
@@ -31,7 +31,7 @@ def model_path(models: Path, kind: str, seed: int) -> Path:
     return models / f"{kind}-seed{seed}.safetensors"
 
 
-def packed(path: Path) -> Path:
+def find_file(path: Path) -> Path:
     """Return the path of a file, or of its compressed copy, which a published run has in its place."""
     copy = path.with_name(f"{path.name}.gz")
     return copy if copy.is_file() and not path.is_file() else path
@@ -97,9 +97,9 @@ class RunFolder:
             raise ResultsError(f"{self.config_path}: {OLD}")
         return config
 
-    def changed(self, digests: Mapping[str, str]) -> dict[str, str]:
+    def find_changes(self, digests: Mapping[str, str]) -> dict[str, str]:
         """Return those of these files that are not as the run wrote them: name -> gone or damaged."""
-        paths = {name: packed(self.path / name) for name in digests}
+        paths = {name: find_file(self.path / name) for name in digests}
         gone = {name: "gone" for name, path in paths.items() if not path.is_file()}
         present = {name: digest_of_file(path) for name, path in paths.items() if name not in gone}
         return gone | {name: "damaged" for name, now in present.items() if now != digests[name]}
@@ -117,7 +117,7 @@ class RunFolder:
     def read_rows(self) -> list[Row]:
         """All rows. Raises ResultsError naming file and line when the file is absent or broken."""
         try:
-            path = regular(packed(self.rows_path))
+            path = demand_file(find_file(self.rows_path))
             with (gzip.open if path.suffix == ".gz" else open)(
                 path, "rt", newline="", encoding="utf-8"
             ) as stream:

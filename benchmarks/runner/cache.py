@@ -44,7 +44,7 @@ class Cache:
             entry = read_json(path)
         if (entry.get("format"), entry.get("task")) != (FORMAT, task.title):
             return "missing: its entry is damaged or of another version", None
-        if lost := self.folder.changed(entry["files"]):
+        if lost := self.folder.find_changes(entry["files"]):
             return "missing: " + ", ".join(f"{name} is {state}" for name, state in lost.items()), None
         now, before = dependencies(task, others), entry["parts"]
         if changes := [name for name in now | before if now.get(name) != before.get(name)]:

@@ -15,7 +15,7 @@ from benchmarks.plan.cell import Cell
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.task import Context, Needed, Outcome, failure
 from benchmarks.scene import BuiltScene, Scene
-from benchmarks.timing import Reading, clocked, peak_memory
+from benchmarks.timing import Reading, peak_memory, time_run
 
 if TYPE_CHECKING:
     import numpy as np
@@ -29,14 +29,14 @@ INPUTS = 0.1  # of the time measured of a run, for its inputs: a few equal milli
 UNBELIEVABLE = "its time cannot be believed: "
 
 
-def prepared_method(cell: Cell, context: Context) -> Method:
+def prepare_method(cell: Cell, context: Context) -> Method:
     """Return a prepared method that has not run."""
     method = cell.entry.make(models=context.folder.models_of(cell.scene.garment), seed=cell.seed)
     method.prepare(build_scene(cell.scene, context))
     return method
 
 
-def timed(method: Method, min_time: float) -> tuple[Trajectory, Reading, list[np.ndarray]]:
+def clock(method: Method, min_time: float) -> tuple[Trajectory, Reading, list[np.ndarray]]:
     """Return the trajectory, the time of each run, and the times (T,) [s] it states for its frames."""
     frames = []
 
@@ -45,7 +45,7 @@ def timed(method: Method, min_time: float) -> tuple[Trajectory, Reading, list[np
         frames.append(trajectory.frame_seconds)
         return trajectory
 
-    trajectory, reading = clocked(run, read=lambda trajectory: trajectory.positions, min_time=min_time)
+    trajectory, reading = time_run(run, read=lambda trajectory: trajectory.positions, min_time=min_time)
     # A first run that compiled is not among them.
     return trajectory, reading, frames[-len(reading.runs) :]
 
@@ -83,9 +83,9 @@ def files_of(cell: Cell, folder: RunFolder) -> tuple[str, ...]:
 def compute_cell(cell: Cell, min_time: float, context: Context) -> Outcome:
     """Prepare off the clock, run on it, write the trajectory; memory is that until the run has ended."""
     folder = context.folder
-    scene, method = build_scene(cell.scene, context), prepared_method(cell, context)
+    scene, method = build_scene(cell.scene, context), prepare_method(cell, context)
     if cell.timed:
-        trajectory, reading, frames = timed(method, 0.0)
+        trajectory, reading, frames = clock(method, 0.0)
     else:
         trajectory, reading = method.run(), Reading((math.nan,))
     peak = peak_memory()  # what follows, as many bodies at once, is not what others are compared by
@@ -99,10 +99,10 @@ def compute_cell(cell: Cell, min_time: float, context: Context) -> Outcome:
         result["declared_ms"] = trajectory.provenance["declared_ms"]
     if cell.timed and not reading.complaint:
         if reading.seconds < min_time:
-            _, rerun, tail = timed(method, min_time - reading.seconds)
+            _, rerun, tail = clock(method, min_time - reading.seconds)
             reading = Reading(reading.runs + rerun.runs, rerun.complaint)
             frames += tail
-        inputs = clocked_inputs(method, scene, min_time=INPUTS * min_time)
+        inputs = time_inputs(method, scene, min_time=INPUTS * min_time)
         result |= times(cell, reading, frames) | {"inputs": inputs.seconds}
         reading = replace(reading, complaint=reading.complaint or inputs.complaint)
     entry = cell.entry
@@ -128,8 +128,10 @@ def compute_cell(cell: Cell, min_time: float, context: Context) -> Outcome:
 
 def time_batch(cell: Cell, min_time: float, context: Context, needed: Needed) -> Outcome:
     """Return the time of many bodies at once, by the method that this process has run."""
-    method = context.memo.get("method") or prepared_method(cell, context)
-    positions, reading = clocked(method.batch(BATCH), read=lambda positions: positions, min_time=min_time)
+    method = context.memo.get("method") or prepare_method(cell, context)
+    positions, reading = time_run(
+        method.batch(BATCH), read=lambda positions: positions, min_time=min_time
+    )
     seconds = reading.seconds / (positions.shape[0] * positions.shape[1])
     result = {"seconds": seconds, "complaint": reading.complaint}
     if reading.complaint:
@@ -141,7 +143,7 @@ def repeat_cell(longest: float, cell: Cell, min_time: float, context: Context, n
     """Return the time of one more run of a cell, whose first did not take longer than `longest` [s]."""
     if needed[cell.id()].result["seconds"] > longest:
         return Outcome("skipped", "the first run took too long")
-    _, reading, frames = timed(prepared_method(cell, context), min_time)
+    _, reading, frames = clock(prepare_method(cell, context), min_time)
     if reading.complaint:
         return Outcome("failed", reading.complaint, result={"seconds": reading.seconds})
     return Outcome(result=times(cell, reading, frames))
@@ -162,7 +164,7 @@ def build_scene(scene: Scene, context: Context) -> BuiltScene:
     return built
 
 
-def clocked_inputs(method: Method, scene: BuiltScene, *, min_time: float) -> Reading:
+def time_inputs(method: Method, scene: BuiltScene, *, min_time: float) -> Reading:
     """[s] a frame of what run() takes as ready, made frame after frame, as poses come in."""
     import numpy as np
 
@@ -177,7 +179,7 @@ def clocked_inputs(method: Method, scene: BuiltScene, *, min_time: float) -> Rea
         return np.zeros(1)
 
     make(0)  # whatever is loaded or compiled at first
-    _, reading = clocked(all_frames, read=lambda images: images, min_time=min_time)
+    _, reading = time_run(all_frames, read=lambda images: images, min_time=min_time)
     return replace(reading, runs=tuple(seconds / frames for seconds in reading.runs))
 
 

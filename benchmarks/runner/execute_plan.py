@@ -63,7 +63,7 @@ def execute(plan: Plan, assets: Assets | None = None) -> int:
     answer = make_report(log)
     if answer:
         print(answer, flush=True)
-    failed = [row for row in log.rows if not accepted(row)]
+    failed = [row for row in log.rows if not is_accepted(row)]
     ends = dict.fromkeys(f"{row.scene} x {row.method}: {row.status}: {row.reason}" for row in failed)
     lines = [*ends, *runner.broken()]
     if failures := len(lines):
@@ -132,7 +132,7 @@ def check_methods(plan: Plan) -> Assets | None:
     return assets
 
 
-def accepted(row: Row) -> bool:
+def is_accepted(row: Row) -> bool:
     """Return whether a row lets the run end with status 0; an extreme case may fail with a reason."""
     return row.passed or (row.suite == "extremes" and row.status != "failed" and bool(row.reason))
 

@@ -114,7 +114,7 @@ class Executor:
             finally:
                 self.back_end.rest()
 
-    def alone(self, task: Task, needed: Needed) -> Outcome:
+    def run_alone(self, task: Task, needed: Needed) -> Outcome:
         """Return the outcome of a timed task, done in the process that it names, with nothing beside it."""
         if task.process not in self._named:
             assets = self.assets.only(task.motion) if self.assets and task.motion else None

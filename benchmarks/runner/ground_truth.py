@@ -54,7 +54,7 @@ def files_of_start(scene: Scene, run: RunFolder) -> tuple[str, ...]:
 def simulate_motion(scene: Scene, entry: MethodEntry, context: Context, needed: Needed) -> Outcome:
     """Write the simulation of a training motion by a method, settling included; a whole one teaches."""
     built, run = scene.build(context.assets), context.folder
-    trajectory = simulated(built, entry, run)
+    trajectory = simulate_scene(built, entry, run)
     path = run.trajectory_path(scene.name, entry.name)
     # Without what the clock showed: the same simulation has the same bytes wherever it is done.
     replace(trajectory, frame_seconds=trajectory.frame_seconds[:0]).save(path)
@@ -89,11 +89,11 @@ def simulate_clips(
     assert assets is not None
     arrays: dict[str, Any] = {}
     left_out: dict[str, str] = {}
-    sources = assets.named(motions)
+    sources = assets.pick(motions)
     vertices = len(assets.garments[scene.garment].rest_positions)
     before, clips = (make_shared_clips(sources, share, vertices=vertices) for share in (part, part + 1))
     for clip in clips[len(before) :]:
-        positions, reason = simulated_clip(clip, scene, entry, context)
+        positions, reason = simulate_clip(clip, scene, entry, context)
         if reason:
             left_out[clip.name] = reason
         else:
@@ -109,7 +109,7 @@ def clips_of(garment: str, motions: tuple[str, ...]) -> str:
     return f"{garment}/mixed-{len(motions)}"
 
 
-def simulated_clip(
+def simulate_clip(
     clip: Motion, scene: Scene, entry: MethodEntry, context: Context
 ) -> tuple[np.ndarray, str]:
     """Return positions (T,V,3) [m] of a clip, and why no network learns from them, or empty."""
@@ -120,7 +120,7 @@ def simulated_clip(
     assets = replace(assets, motions={clip.name: clip}, clips={})
     built = replace(scene, name=f"{scene.garment}/{clip.name}", motion=clip.name).build(assets)
     try:
-        trajectory = simulated(built, entry, context.folder)
+        trajectory = simulate_scene(built, entry, context.folder)
     except RuntimeError as error:  # a pose that leaves the cloth no room
         return np.empty(0), str(error) or type(error).__name__
     usable = trajectory.status == "converged" or entry.truncated
@@ -128,7 +128,7 @@ def simulated_clip(
     return trajectory.positions, "" if usable and whole else f"{trajectory.status}: {trajectory.reason}"
 
 
-def simulated(scene: BuiltScene, entry: MethodEntry, folder: RunFolder) -> Trajectory:
+def simulate_scene(scene: BuiltScene, entry: MethodEntry, folder: RunFolder) -> Trajectory:
     """Return the trajectory of a scene by a method that needs no network."""
     method = entry.make(models=folder.models, seed=0)
     method.prepare(replace(scene, dressed=None))  # so that it shows no bar beside that of all tasks

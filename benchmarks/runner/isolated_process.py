@@ -99,7 +99,7 @@ class TaskProcess:
             self._process.join()
             code = self._process.exitcode
             self._kill()
-            raise WorkerDied(*how_it_ended(code)) from None
+            raise WorkerDied(*explain_exit(code)) from None
         except BaseException:
             self._kill()
             raise
@@ -135,7 +135,7 @@ class TaskProcess:
             self._process = None
 
 
-def how_it_ended(code: int) -> tuple[str, str]:
+def explain_exit(code: int) -> tuple[str, str]:
     """Reason and status of a process that ended by itself with this exit code.
 
     Nobody here kills a process that answers in time: a SIGKILL comes from a system that is out of memory.

@@ -43,7 +43,7 @@ class Runner:
             with Progress(unknown, executor.back_end.slots) as self.progress:
                 while rest := [task for task in unknown if task.id not in self.outcomes]:
                     tasks = _able(rest, timed=False) or _able(rest, timed=True)
-                    (self._alone if tasks[0].process else self._side_by_side)(tasks, executor)
+                    (self._run_alone if tasks[0].process else self._side_by_side)(tasks, executor)
         finally:
             executor.close()
 
@@ -55,7 +55,7 @@ class Runner:
             for batch in filter(self._is_ready, list(waiting)):
                 waiting.remove(batch)
                 if todo := [task for task in batch if self.decide(task)]:
-                    return todo, self._needed(*todo)
+                    return todo, self._find_needs(*todo)
             return None
 
         for task, outcome in executor.together(ready):
@@ -66,11 +66,11 @@ class Runner:
         ids = (id for task in batch for id in (*task.needs, *task.reads))
         return all(id in self.outcomes or id not in self.titles for id in ids)
 
-    def _alone(self, tasks: Sequence[Task], executor: Executor) -> None:
+    def _run_alone(self, tasks: Sequence[Task], executor: Executor) -> None:
         """Do timed tasks one by one; a process ends as soon as no other task will want it."""
         for place, task in enumerate(tasks):
             if self.decide(task):
-                self._keep(task, executor.alone(task, self._needed(task)))
+                self._keep(task, executor.run_alone(task, self._find_needs(task)))
             others = (other for other in tasks[place + 1 :] if other.process == task.process)
             if all(self._find(other)[1] for other in others):
                 executor.release(task.process)
@@ -94,23 +94,23 @@ class Runner:
 
     def _find(self, task: Task) -> tuple[str, Outcome | None]:
         """Return why a task has to run, or how it failed; and its outcome where that is known."""
-        needed = self._needed(task)
+        needed = self._find_needs(task)
         if task.skip:
             return task.skip, Outcome("skipped", task.skip)
         for id in task.needs:
             if id not in needed:
-                outcome = self._blocked(id)
+                outcome = self._refuse(id)
                 return outcome.reason, outcome
         return self.cache.find(task, self.outcomes)
 
-    def _blocked(self, missing: TaskId) -> Outcome:
+    def _refuse(self, missing: TaskId) -> Outcome:
         """Return the outcome of a task that lacks a need; nothing of it is kept."""
         title, other = self.titles.get(missing, " ".join(missing)), self.outcomes.get(missing, Outcome())
         if other.status == "skipped":
             return Outcome("skipped", f"{title}: {other.reason}")
         return Outcome("failed", f"cannot be run: {title}: {other.ending}", failed=True)
 
-    def _needed(self, *tasks: Task) -> dict[TaskId, Outcome]:
+    def _find_needs(self, *tasks: Task) -> dict[TaskId, Outcome]:
         """Return the usable outcomes of what the tasks need or read."""
         ids = dict.fromkeys(id for task in tasks for id in (*task.needs, *task.reads))
         return {id: self.outcomes[id] for id in ids if id in self.outcomes and self.outcomes[id].usable}

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks.metric import Estimate, RollOut, SceneRollOuts, measurements_in
-from benchmarks.metrics import MEASUREMENTS, find_metric, measured_in
+from benchmarks.metrics import MEASUREMENTS, find_metric, pick_measured
 from benchmarks.plan.cell import Cell, id_of
 from benchmarks.results.protocol import noise
 from benchmarks.results.row import STATUSES, USABLE
@@ -43,7 +43,7 @@ def measure_cell(
         other = replace(cell, scene=replace(cell.scene, name=cell.scene.counterpart))
         if needed.get(other.id(), Outcome("skipped")).status in USABLE:
             roll_out.counterpart = _positions(folder.trajectory_path(*other.key))
-    metrics, curves, (status, reason) = measured(roll_out, cell.scene.metrics, outside)
+    metrics, curves, (status, reason) = measure_roll_out(roll_out, cell.scene.metrics, outside)
     path = folder.curves_path(*cell.key)
     if curves:
         curves[SECONDS] = np.array(roll_out.trajectory.times[: len(roll_out.positions)], dtype=float)
@@ -84,7 +84,7 @@ def roll_outs_of(
     return roll_outs
 
 
-def measured(
+def measure_roll_out(
     roll_out: RollOut, chosen: Sequence[str] | None = None, outside: tuple[str, ...] = ()
 ) -> tuple[dict[str, float | Estimate], dict[str, np.ndarray], tuple[str, str]]:
     """Return metrics and curves of a roll-out, and status and reason where a metric says that it has failed.
@@ -99,7 +99,7 @@ def measured(
     if roll_out.entry.other_mesh:
         entries = [entry for entry in MEASUREMENTS if entry.other_meshes]
     else:
-        entries = [*measured_in(chosen), *map(measurements_in, outside)]
+        entries = [*pick_measured(chosen), *map(measurements_in, outside)]
     for entry in entries if has_frames else ():
         suites = entry.suites or roll_out.suites
         if not any(suite in suites for suite in roll_out.suites):
@@ -107,7 +107,7 @@ def measured(
         try:
             values = dict(entry.measure(roll_out)) if entry.measure else {}
             if entry.compare:
-                values |= compared(roll_out, entry.compare)
+                values |= compare_family(roll_out, entry.compare)
             metrics |= {find_metric(name, outside).name: number(name, v) for name, v in values.items()}
             curves |= entry.series(roll_out) if entry.series else {}
             ended = (entry.judge(roll_out, values) if entry.judge else None) or ended
@@ -127,7 +127,7 @@ def number(metric: str, value: Any) -> float | Estimate:
     return float(value)
 
 
-def compared(
+def compare_family(
     roll_out: RollOut, compare: Callable[[RollOut, RollOut], dict[str, float]]
 ) -> dict[str, float | Estimate]:
     """Return the numbers against the reference, with their change against each member of its family."""

@@ -92,14 +92,14 @@ def train(job: NetworkTraining, context: Context, needed: Needed) -> Outcome:
         whole = {o.result["motion"]: o for o in needed.values() if o.result.get("whole")}
         motions = tuple(motion for motion in job.motions if motion in whole)
         targets = {m: Trajectory.load(run.path / o.files[0]).positions for m, o in whole.items()}
-        mixed, simulated = mixed_clips(job, assets, run, needed)
+        mixed, simulated = mix_clips(job, assets, run, needed)
         targets |= simulated
     checkpoint = Checkpoint(
         path=path.with_name(f".{path.stem}.checkpoint.safetensors"), minutes=CHECKPOINT_MINUTES,
         resume=True, key=digest([job.key, targets]),
     )  # fmt: skip
     model = train_network(
-        training.kind, dressed, [*assets.named(motions), *mixed], steps=job.steps, seed=network.seed,
+        training.kind, dressed, [*assets.pick(motions), *mixed], steps=job.steps, seed=network.seed,
         trajectories=targets, recipe=training.recipe, progress=False, every=EVERY, device=job.device,
         checkpoint=checkpoint,
     )  # fmt: skip
@@ -148,7 +148,7 @@ def origin_of(job: NetworkTraining, needed: Needed, *, left_out: list[str]) -> d
     }
 
 
-def mixed_clips(
+def mix_clips(
     job: NetworkTraining, assets: Assets, folder: RunFolder, needed: Needed
 ) -> tuple[list[Motion], dict[str, np.ndarray]]:
     """Return the simulated augmented clips, and their vertices (T,V,3) [m] by name."""
@@ -162,7 +162,7 @@ def mixed_clips(
     if twice := sorted(vertices_of.keys() & set(job.motions)):
         raise ValueError(f"training motion {twice[0]!r}: a mixed clip is called so: rename its file")
     vertices = len(assets.garments[job.network.garment].rest_positions)
-    clips = make_shared_clips(assets.named(job.motions), len(parts), vertices=vertices)
+    clips = make_shared_clips(assets.pick(job.motions), len(parts), vertices=vertices)
     return [clip for clip in clips if clip.name in vertices_of], vertices_of
 
 
@@ -171,7 +171,7 @@ MACHINE = "machine"  # the input of a task that says where it runs
 MAKE = "benchmarks.run -o DIR trains it, --trained DIR takes it"
 
 
-def pretrained_network(job: NetworkTraining, folder: Path) -> tuple[Path | None, str]:
+def find_pretrained(job: NetworkTraining, folder: Path) -> tuple[Path | None, str]:
     """Return the file of a network in a folder of such files, or of the run that trained it.
 
     Where there is none, or one of another training (of a packaged one: of another body or garment), why it

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 
 from benchmarks.plan.cell import TaskId
 from benchmarks.runner.task import Task
-from reference_sim.command_line import SECONDS_OF_A_LOG, compilation_is_due
+from reference_sim.command_line import SECONDS_OF_A_LOG, must_compile
 
 # [s] on an idle core: of a step of SNUG's training, else of a task of some 60 frames at 1000 vertices.
 EXPECTED = {
@@ -40,7 +40,7 @@ class Progress:
         self.since: dict[TaskId, float] = {}  # batch -> when that of its tasks began which is at work
         # Of a kind, of its tasks that have ended [s].
         self.seconds, self.expected = defaultdict[str, float](float), defaultdict[str, float](float)
-        self.compiling = COMPILING if compilation_is_due() else 0.0
+        self.compiling = COMPILING if must_compile() else 0.0
         self.shown, self.stage = math.inf, ""
         self._stopped = threading.Event()
 

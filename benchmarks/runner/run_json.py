@@ -10,7 +10,7 @@ from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
 from benchmarks import provenance
-from benchmarks.metrics import declared, find_metric
+from benchmarks.metrics import find_metric, list_metrics
 from benchmarks.plan.plan import Plan
 from benchmarks.provenance import digest, digest_of_file
 from benchmarks.results import run_folder
@@ -109,7 +109,7 @@ class RunLog:
         self.count_look()
         self.folder.write_rows(self.rows)
         run_folder.write_frame_energies(self.folder, self.rows)
-        self.config |= described(self.plan, self.rows)
+        self.config |= describe_plan(self.plan, self.rows)
         written = (self.folder.rows_path, self.folder.frame_energies_path)
         self.config["digests"] = {path.name: digest_of_file(path) for path in written if path.is_file()}
         self.folder.write_config(self.config)
@@ -130,10 +130,10 @@ def now() -> str:
     return datetime.now().astimezone().isoformat(timespec="seconds")
 
 
-def described(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
+def describe_plan(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
     """Return what run.json says of metrics, methods, scenes and cases that is not in their rows."""
     methods = {cell.method: cell.entry for cell in plan.cells}
-    order = {name: place for place, name in enumerate(declared(plan.metrics))}
+    order = {name: place for place, name in enumerate(list_metrics(plan.metrics))}
     names = dict.fromkeys(row.metric for row in rows if row.method in methods)
     metrics = {}
     for name in sorted(names, key=lambda name: order.get(name, len(order))):

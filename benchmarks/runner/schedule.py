@@ -32,10 +32,10 @@ from benchmarks.runner.ground_truth import (
     simulate_quasi_static,
 )
 from benchmarks.runner.measurements import measure_cell
-from benchmarks.runner.networks import NetworkTraining, pretrained_network, take, train
+from benchmarks.runner.networks import NetworkTraining, find_pretrained, take, train
 from benchmarks.runner.task import Outcome, Task
 from benchmarks.scene import Scene
-from benchmarks.scenes import find_scene, of_garment
+from benchmarks.scenes import find_garment, find_scene
 from snug.trained import FOLDER
 
 if TYPE_CHECKING:
@@ -58,7 +58,7 @@ CASES = (*MEASURING, "benchmarks/validation")
 USERS_OWN = (*MEASURING, "benchmarks/methods")  # what a user's file may import
 
 
-def declared(entry: MethodEntry | Scene | Case) -> dict[str, Any]:
+def read_entry(entry: MethodEntry | Scene | Case) -> dict[str, Any]:
     """Return what a scene, a method or a case declares, without descriptions; of files their content."""
     values = {name: value for name, value in vars(entry).items() if name not in ("description", "label")}
     if isinstance(entry, MethodEntry | Scene):
@@ -107,7 +107,7 @@ class Schedule:
         """Yield the tasks in the order in which they are done."""
         plan = self.plan
         simulated = {scene.name: scene for scene in plan.scenes if scene.simulated}
-        others = (self._settled_in(scene) for scene in simulated.values() if scene.start_of)
+        others = (self._find_start(scene) for scene in simulated.values() if scene.start_of)
         yield from map(self.start, ({scene.name: scene for scene in others} | simulated).values())
         networks = {network: self.network(network) for network in plan.networks}
         trained = (network for network, task in networks.items() if task.stage == TRAINED)
@@ -129,8 +129,8 @@ class Schedule:
         return Task(
             kind="start", name=flat(scene.name), label=scene.name, stage="ground truth", silent=True,
             run=partial(settle_start, scene), files=files_of_start(scene, self.folder),
-            needs=(id_of("start", self._settled_in(scene)),) if scene.start_of else (),
-            **self._of_scene(scene),
+            needs=(id_of("start", self._find_start(scene)),) if scene.start_of else (),
+            **self._list_scene(scene),
         )  # fmt: skip
 
     def ground_truth(self, network: Network) -> list[Task]:
@@ -146,25 +146,25 @@ class Schedule:
 
     def data(self, motion: str, garment: str, entry: MethodEntry) -> Task:
         """Return the task that simulates a training motion."""
-        scene = of_garment(garment, self.plan.motions.garments).scene(motion).at(self.preset)
+        scene = find_garment(garment, self.plan.motions.garments).scene(motion).at(self.preset)
         return Task(
             kind="data", name=f"{flat(scene.name)}/{flat(entry.name)}", label=_label(scene.name, entry),
             stage="ground truth", silent=True, run=partial(simulate_motion, scene, entry),
-            **self._of_scene(scene, *code_behind(entry), method=declared(entry)),
+            **self._list_scene(scene, *code_behind(entry), method=read_entry(entry)),
         )  # fmt: skip
 
     def clips(self, garment: str, simulated: Simulated, motions: tuple[str, ...], part: int) -> Task:
         """Return the task that simulates one part of the augmented clips of these motions."""
         entry = find_method(simulated.method)
         clips = clips_of(garment, motions)
-        scene = of_garment(garment, self.plan.motions.garments).scene(motions[0]).at(self.preset)
+        scene = find_garment(garment, self.plan.motions.garments).scene(motions[0]).at(self.preset)
         mixed_of = {name: self._motion(name) for name in motions}
         return Task(
             kind="clips", name=f"{flat(clips)}/{flat(entry.name)}-{part}",
             label=_label(f"{garment}, mixed clips of {len(motions)} motions, part {part}", entry),
             stage="ground truth", silent=True, run=partial(simulate_clips, scene, entry, motions, part),
-            **self._of_scene(
-                scene, *code_behind(entry), method=declared(entry), part=part, motions=mixed_of
+            **self._list_scene(
+                scene, *code_behind(entry), method=read_entry(entry), part=part, motions=mixed_of
             ),
         )  # fmt: skip
 
@@ -180,7 +180,7 @@ class Schedule:
             "files": (self.folder.relative(job.path(self.folder)),),
         }  # fmt: skip
         if folder is not None:
-            source, refusal = pretrained_network(job, folder)
+            source, refusal = find_pretrained(job, folder)
             if source or not network.users_training:
                 return Task(
                     stage="pretrained networks", run=partial(take, job, source or Path()), skip=refusal,
@@ -196,7 +196,7 @@ class Schedule:
         """Return how a network is trained."""
         motions, chosen = self.plan.motions.train, network.training.at(self.preset)
         steps = self.preset.steps_of(network.name, chosen.kind)
-        inputs = self._machine(self.plan.study.device) | self._of_body(network.garment)
+        inputs = self._machine(self.plan.study.device) | self._list_body(network.garment)
         if network.packaged:  # of the package's training clips, which are whole
             inputs["assets"]["train_frames"] = find_preset("quick").train_frames
         else:
@@ -219,22 +219,22 @@ class Schedule:
         for cell in cells:
             yield self.cell(cell)
             if cell.entry.batched and runs(cell):
-                yield self._timed(cell, cell.id("batch"), time_batch)
+                yield self._make_timed(cell, cell.id("batch"), time_batch)
         repeated = [cell for cell in cells if "speed" in cell.suites and runs(cell)]
         longest = self.preset.repeat_seconds
         for number in range(1, self.preset.repeats):
             turn = number * len(repeated) // self.preset.repeats
             for cell in (*repeated[turn:], *repeated[:turn]):
-                inputs = {"least": self._least(cell), "longest": longest}
+                inputs = {"least": self._min_time(cell), "longest": longest}
                 run = partial(repeat_cell, longest)
-                yield self._timed(cell, cell.id("repeat", number), run, inputs=inputs)
+                yield self._make_timed(cell, cell.id("repeat", number), run, inputs=inputs)
 
     def cell(self, cell: Cell) -> Task:
         """Return the task that runs a cell: alone where it is timed."""
         entry = cell.entry
-        inputs: dict[str, Any] = {"method": declared(entry)}
+        inputs: dict[str, Any] = {"method": read_entry(entry)}
         if cell.timed:
-            inputs["least"] = self._least(cell)
+            inputs["least"] = self._min_time(cell)
         if entry.seeded:
             inputs["seed"] = cell.seed
         needs = (id_of("start", cell.scene),) if cell.scene.simulated else ()
@@ -242,19 +242,19 @@ class Schedule:
             needs = (*needs, network.task_id)
         fields: dict[str, Any] = {
             "skip": entry.skip(cell.scene) or "", "files": files_of(cell, self.folder), "needs": needs,
-            **self._of_scene(cell.scene, *code_behind(entry), **inputs),
+            **self._list_scene(cell.scene, *code_behind(entry), **inputs),
         }  # fmt: skip
         if cell.timed:
-            return self._timed(cell, cell.id(), run_cell, **fields)
+            return self._make_timed(cell, cell.id(), run_cell, **fields)
         return Task(
             kind="cell", name=cell.name, label=cell.label, stage="untimed methods",
-            run=partial(run_cell, cell, self._least(cell)), batch=cell.scene.name,
+            run=partial(run_cell, cell, self._min_time(cell)), batch=cell.scene.name,
             deadline=self.preset.cell_seconds, **fields,
         )  # fmt: skip
 
-    def _timed(self, cell: Cell, id: TaskId, run: Callable[..., Outcome], **fields: Any) -> Task:
+    def _make_timed(self, cell: Cell, id: TaskId, run: Callable[..., Outcome], **fields: Any) -> Task:
         """Return the run of a timed cell, or a task that follows it in its process."""
-        min_time = self._least(cell)
+        min_time = self._min_time(cell)
         usual = {"inputs": {"least": min_time}, "code": RUNNING, "needs": (cell.id(),)}
         fields = usual | fields
         return Task(
@@ -263,7 +263,7 @@ class Schedule:
             deadline=self.preset.cell_seconds, **fields,
         )  # fmt: skip
 
-    def _least(self, cell: Cell) -> float:
+    def _min_time(self, cell: Cell) -> float:
         """Return the seconds that each of its repeats has to measure, so that it is enough together."""
         return self.preset.least_seconds / (self.preset.repeats if "speed" in cell.suites else 1)
 
@@ -272,7 +272,7 @@ class Schedule:
         return Task(
             kind="quasi-static", name=flat(scene.name), label=scene.name,
             stage="quasi-static solutions", silent=True, run=partial(simulate_quasi_static, scene),
-            needs=(id_of("start", scene),), **self._of_scene(scene),
+            needs=(id_of("start", scene),), **self._list_scene(scene),
         )  # fmt: skip
 
     def metrics(self, cell: Cell) -> Task:
@@ -296,7 +296,7 @@ class Schedule:
             kind="metrics", name=cell.name, label=cell.label, stage="metrics",
             run=run, needs=(cell.id(),), reads=reads, batch=f"{scene.name} {part}",
             files=(self.folder.relative(self.folder.curves_path(*cell.key)),),
-            **self._of_scene(
+            **self._list_scene(
                 scene, *MEASURING, *users_code(*plan.metrics), suites=sorted(cell.suites),
                 samples=self.preset.gap_samples, method=method, metrics=scene.metrics,
             ),
@@ -307,7 +307,7 @@ class Schedule:
         return Task(
             kind="case", name=case.name, label=case.name, stage="known answers", run=partial(run_case, case),
             warm_up=case.warm_up, deadline=case.seconds, process=case.process,
-            inputs=self._machine() | {"declared": declared(case)},
+            inputs=self._machine() | {"declared": read_entry(case)},
             code=(find_module(case.module), *CASES),
         )  # fmt: skip
 
@@ -317,20 +317,20 @@ class Schedule:
         names = ("processor", "python", "accelerator")  # one thread works, however many cores there are
         return {"machine": {name: facts.get(name) for name in names} | {"device": device, "threads": 1}}
 
-    def _of_scene(self, scene: Scene, *code: str, **inputs: Any) -> dict[str, Any]:
+    def _list_scene(self, scene: Scene, *code: str, **inputs: Any) -> dict[str, Any]:
         """Return inputs and code of a task that builds the scene, these included; its metrics are no part."""
-        declaration = declared(scene) | {"timed": scene.timed, "dynamic": scene.dynamic}
+        declaration = read_entry(scene) | {"timed": scene.timed, "dynamic": scene.dynamic}
         del declaration["metrics"], declaration["counterpart"]
         inputs |= self._machine() | {"scene": declaration}
         if scene.dressed:
-            inputs |= self._of_body(scene.garment) | {"motion": self._motion(scene.motion)}
+            inputs |= self._list_body(scene.garment) | {"motion": self._motion(scene.motion)}
             if scene.motion not in self.plan.motions.train:  # those have a length of their own
                 inputs["frames"] = self.preset.frames
         if scene.part == "clip":
             inputs["clip_frames"] = self.preset.clip_frames
         return {"inputs": inputs, "code": (*code, *RUNNING, *code_behind(scene))}
 
-    def _of_body(self, garment: str) -> dict[str, Any]:
+    def _list_body(self, garment: str) -> dict[str, Any]:
         """Return the inputs that the assets are made from."""
         names = ("garment_vertices", "train_frames")
         sizes = {name: getattr(self.preset, name) for name in names} | {"garment": garment}
@@ -349,7 +349,7 @@ class Schedule:
         files = self.plan.inputs.motions
         return f"{name} {digest(files[name])}" if name in files else name
 
-    def _settled_in(self, scene: Scene) -> Scene:
+    def _find_start(self, scene: Scene) -> Scene:
         """Return the scene whose settled garment another one starts from."""
         planned = next((s for s in self.plan.scenes if s.name == scene.start_of), None)
         garment = self.plan.motions.garments[0].garment

@@ -156,7 +156,7 @@ def _dependence(name: str, description: str, **options: int) -> Scene:
     )
 
 
-def there_and_back(motion: str, garment: str = "tshirt") -> Scene:
+def declare_return(motion: str, garment: str = "tshirt") -> Scene:
     """Declare a motion forwards and backwards for a thousand frames."""
     return Scene(
         name=f"{garment}/there_and_back",
@@ -182,10 +182,10 @@ def find_scene(name: str, garment: str = "tshirt") -> Scene:
     >>> find_scene("hanging_sheet").obstacle
     False
     """
-    return by_name("scene", (*SCENES, *further_scenes(garment)))[name]
+    return by_name("scene", (*SCENES, *dress_scenes(garment)))[name]
 
 
-def further_scenes(garment: str) -> tuple[Scene, ...]:
+def dress_scenes(garment: str) -> tuple[Scene, ...]:
     """Return FURTHER_SCENES with that garment on the body, but for those that tailor another."""
     scenes = (s for s in FURTHER_SCENES if not s.own_garment or s.garment == garment)
     return tuple(replace(scene, garment=garment) for scene in scenes)
@@ -231,7 +231,7 @@ GARMENT_SCENES = (
 )
 
 
-def of_garment(garment: str, garments: tuple[GarmentScenes, ...] = GARMENT_SCENES) -> GarmentScenes:
+def find_garment(garment: str, garments: tuple[GarmentScenes, ...] = GARMENT_SCENES) -> GarmentScenes:
     """Return the scenes of that garment. Raises DeclarationError."""
     index = {scenes.garment: scenes for scenes in garments}
     if garment not in index:
@@ -253,7 +253,7 @@ def all_scenes(
     motions, dynamic = list(motions), list(dynamic_motions)
     first = garments[0].garment
     varied = [
-        s for motion in motions[:1] for s in (there_and_back(motion, first), *shapes(motion, first))
+        s for motion in motions[:1] for s in (declare_return(motion, first), *shapes(motion, first))
     ]
     every = list(dict.fromkeys((*motions, *dynamic)))
     dressed = [
@@ -262,4 +262,4 @@ def all_scenes(
         for motion in (dynamic if scenes.dynamic else every)
         for part in ("whole", "clip")
     ]
-    return by_name("scene", (*SCENES, *dressed, *varied, *further_scenes(first)))
+    return by_name("scene", (*SCENES, *dressed, *varied, *dress_scenes(first)))

@@ -53,29 +53,29 @@ def build_dressed_body(
     """
     body, garment = assets.body, assets.garments[scene.garment]
     motion = assets.motion(scene.motion, scene.part)
-    before = assets.before(scene.motion, scene.part)
+    before = assets.cut_before(scene.motion, scene.part)
     dressed = Dressed(body, garment, motion, shape_of(body, betas, scene.name), before)
 
     def settle() -> np.ndarray:
         if before is None:
-            return settled(cloth, terms, dressed, settle_frames)
-        start = settled(cloth, terms, replace(dressed, motion=before), settle_frames)
+            return drape(cloth, terms, dressed, settle_frames)
+        start = drape(cloth, terms, replace(dressed, motion=before), settle_frames)
         way, aim = before.followed_by(motion.cut(0, 1)), "reach the first frame of the clip"
-        x = _simulated(cloth, terms, replace(dressed, motion=way), start, aim)
+        x = _simulate(cloth, terms, replace(dressed, motion=way), start, aim)
         return np.stack([x[-1], (x[-1] - x[-2]) * way.fps])
 
     cloth = garment.cloth()
-    energies = declared_energies(cloth)
+    energies = declare_energies(cloth)
     minimised = with_self_contact(energies) if scene.self_contact else ()
     terms = minimised or energies
     warm_up = max(2, min(warm_up_frames, int(SHORT * motion.frames)))
-    return worn(
+    return dress(
         scene, dressed, cloth=cloth, energies=energies, settle=settle, minimised=minimised,
         warm_up=warm_up,
     )  # fmt: skip
 
 
-def worn(scene: Scene, dressed: Dressed, **fields: Any) -> BuiltScene:
+def dress(scene: Scene, dressed: Dressed, **fields: Any) -> BuiltScene:
     """Return the scene of a garment on a moving body, with further fields of BuiltScene."""
     body, garment, motion, shape = dressed.body, dressed.garment, dressed.motion, dressed.betas
     posed = body.vertices(motion.poses, motion.translations, shape)
@@ -85,7 +85,7 @@ def worn(scene: Scene, dressed: Dressed, **fields: Any) -> BuiltScene:
         dt=1.0 / motion.fps,
         frames=motion.frames,
         # Which faces a vertex may touch is a matter of the body that the garment was made for.
-        obstacle=Obstacle(posed, body.faces, rest_positions=body.shaped()),
+        obstacle=Obstacle(posed, body.faces, rest_positions=body.rest_vertices()),
         origin_heights=dressed.pelvis[:, 1],
         dressed=dressed,
         pin_positions=handles.__getitem__ if len(garment.pins) else None,
@@ -105,7 +105,7 @@ def shape_of(body: Body, betas: tuple[float, ...], scene: str) -> np.ndarray | N
     return np.pad(betas, (0, body.shape_count - len(betas)))
 
 
-def declared_energies(cloth: Cloth) -> tuple[Energy, ...]:
+def declare_energies(cloth: Cloth) -> tuple[Energy, ...]:
     """Return the paper's terms of a garment; inertia comes with the time step."""
     return (StretchStVK(cloth), BendHinge(cloth), Gravity(cloth), ContactPenalty(cloth))
 
@@ -122,7 +122,7 @@ def with_self_contact(energies: tuple[Energy, ...]) -> tuple[Energy, ...]:
     return (*energies, ContactBarrier(energies[0].cloth, distance=DISTANCE, stiffness=STIFFNESS))
 
 
-def settled(cloth: Cloth, energies: tuple[Energy, ...], dressed: Dressed, frames: int) -> np.ndarray:
+def drape(cloth: Cloth, energies: tuple[Energy, ...], dressed: Dressed, frames: int) -> np.ndarray:
     """Simulate the cloth to rest on the body in the motion's first pose: positions (V,3) [m].
 
     Raises RuntimeError when the simulation of the approach did not stay finite, or a piece of the garment
@@ -139,7 +139,7 @@ def settled(cloth: Cloth, energies: tuple[Energy, ...], dressed: Dressed, frames
     root = body.transforms(t_pose[None], translations[:1], betas)[0, 0]
     start = garment.rest_for(body, betas) @ root[:, :3].T + root[:, 3]
     way = replace(dressed, motion=replace(motion, poses=poses, translations=translations))
-    x = _simulated(cloth, energies, way, start, "come to rest in the first pose")[-1]
+    x = _simulate(cloth, energies, way, start, "come to rest in the first pose")[-1]
     whole = replace(garment, pins=np.arange(len(x)))
     carried = whole.pin_positions(body, first[None], translations[:1], betas)[0]
     off = np.linalg.norm(x - carried, axis=1)
@@ -153,7 +153,7 @@ def settled(cloth: Cloth, energies: tuple[Energy, ...], dressed: Dressed, frames
     return x
 
 
-def _simulated(
+def _simulate(
     cloth: Cloth, energies: tuple[Energy, ...], dressed: Dressed, start: np.ndarray, aim: str
 ) -> np.ndarray:
     """Simulate every frame of the motion, (T,V,3) [m]. Raises RuntimeError naming the missed `aim`."""
@@ -162,7 +162,7 @@ def _simulated(
     handles = garment.pin_positions(body, motion.poses, motion.translations, betas)
     trajectory: Trajectory = simulate(
         cloth, energies, dt=1.0 / motion.fps, frames=motion.frames, start=start,
-        obstacle=Obstacle(posed, body.faces, rest_positions=body.shaped()),
+        obstacle=Obstacle(posed, body.faces, rest_positions=body.rest_vertices()),
         pin_positions=handles.__getitem__ if len(garment.pins) else None,
     )  # fmt: skip
     # A step that diverges ends a simulation: a garment is left half-way, on a body that moved on.

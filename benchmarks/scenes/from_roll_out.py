@@ -25,7 +25,7 @@ LONGEST_STRETCH = 3.0  # times as long as at rest, edges in the mean: their vert
 MIN_FRAMES = 4  # frames: two are not judged, and a mean is of more than one
 
 
-def declared(option: RollOutOption, rest_mesh: str) -> Scene:
+def declare_scene(option: RollOutOption, rest_mesh: str) -> Scene:
     """Declare the scene of that roll-out. Raises RollOutFileError for an unreadable file, or half a body."""
     stored = read_roll_out(option.path)
     halves = {"obstacle": stored.obstacle, "obstacle_faces": stored.obstacle_faces}

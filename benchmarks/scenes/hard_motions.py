@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks.scene import BuiltScene, Dressed, Scene
-from benchmarks.scenes.dressed_body import declared_energies, settled, shape_of, worn
+from benchmarks.scenes.dressed_body import declare_energies, drape, dress, shape_of
 from reference_sim.energies.bend_hinge import BendHinge
 from reference_sim.energies.gravity import Gravity
 from reference_sim.energies.stretch_stvk import StretchStVK
@@ -55,17 +55,17 @@ def build_hard_motion(
         name: factor * getattr(garment.material, name) for name, factor in (material or {}).items()
     }
     cloth = garment.cloth(replace(garment.material, **changed))
-    energies = declared_energies(cloth)
+    energies = declare_energies(cloth)
 
     def settle() -> np.ndarray:
         if shape is None:
-            return settled(cloth, energies, dressed, settle_frames)
+            return drape(cloth, energies, dressed, settle_frames)
         root = body.transforms(motion.poses[:1], motion.translations[:1], shape)[0, 0]
         return garment.rest_for(body, shape) @ root[:, :3].T + root[:, 3]
 
     glitch = GLITCH if change in ("root_jumps", "limb_flips") else None
     dressed = Dressed(body, garment, motion, shape)
-    return worn(scene, dressed, cloth=cloth, energies=energies, settle=settle, glitch=glitch)
+    return dress(scene, dressed, cloth=cloth, energies=energies, settle=settle, glitch=glitch)
 
 
 def ordinary(walk: Motion) -> Motion:
@@ -81,7 +81,7 @@ def faster(walk: Motion, times: int) -> Motion:
 def another_faster(walk: Motion, times: int, other: str) -> Motion:
     """Return a way into the first pose of another motion, then that motion `times` faster."""
     motion = faster(make_motion(other), times)
-    return _approached(walk, motion.poses, motion.translations)
+    return _approach(walk, motion.poses, motion.translations)
 
 
 def posed(walk: Motion, degrees: Mapping[str, tuple[float, float, float]]) -> Motion:
@@ -89,7 +89,7 @@ def posed(walk: Motion, degrees: Mapping[str, tuple[float, float, float]]) -> Mo
     pose = walk.poses[0].copy()
     for joint, angles in degrees.items():
         pose[JOINT[joint]] = np.deg2rad(angles)
-    return _approached(walk, np.repeat(pose[None], STILL, axis=0), np.zeros((STILL, 3)))
+    return _approach(walk, np.repeat(pose[None], STILL, axis=0), np.zeros((STILL, 3)))
 
 
 def from_t_pose(walk: Motion) -> Motion:
@@ -118,7 +118,7 @@ def limb_flips(walk: Motion) -> Motion:
     return replace(motion, poses=poses)
 
 
-def _approached(walk: Motion, poses: np.ndarray, translations: np.ndarray) -> Motion:
+def _approach(walk: Motion, poses: np.ndarray, translations: np.ndarray) -> Motion:
     """Return the walk's first pose, a smooth way to poses[0], then poses; the root goes on from there."""
     way = transition(walk.poses[0], poses[0], APPROACH)
     stand = np.repeat(walk.translations[:1], APPROACH, axis=0)
@@ -142,10 +142,10 @@ EVERY = 50  # one frame in so many of a loop is kept
 def build_long_motion(scene: Scene, assets: Assets, *, loop_frames: int = 0) -> BuiltScene:
     """Build the scene of the motion in a loop of `loop_frames`, or there and back without that number."""
     if loop_frames:
-        motion, early, late = looped(make_motion(scene.motion), loop_frames)
+        motion, early, late = repeat_walk(make_motion(scene.motion), loop_frames)
         frames = np.unique(np.concatenate([np.arange(0, loop_frames, EVERY), early, late]))
     else:
-        motion = repeated_there_and_back(assets.motion(scene.motion, "whole"))
+        motion = repeat_both_ways(assets.motion(scene.motion, "whole"))
         early, late = np.arange(ENDS), np.arange(motion.frames - ENDS, motion.frames)
         frames = np.concatenate([early, late])
     garment = assets.garments[scene.garment]
@@ -163,7 +163,7 @@ def build_long_motion(scene: Scene, assets: Assets, *, loop_frames: int = 0) -> 
     )
 
 
-def repeated_there_and_back(motion: Motion) -> Motion:
+def repeat_both_ways(motion: Motion) -> Motion:
     """Return the motion again and again, every second time backwards, for `FRAMES` frames or a few more.
 
     Its last hundred frames show the same as its first.
@@ -175,7 +175,7 @@ def repeated_there_and_back(motion: Motion) -> Motion:
     return replace(motion, poses=motion.poses[order], translations=motion.translations[order])
 
 
-def looped(walk: Motion, frames: int) -> tuple[Motion, np.ndarray, np.ndarray]:
+def repeat_walk(walk: Motion, frames: int) -> tuple[Motion, np.ndarray, np.ndarray]:
     """Repeat the walk for so many frames, its end led back into its start.
 
     Returns:

@@ -81,7 +81,7 @@ class Case:
                 answer = answer[self.name]
             if not isinstance(answer, Measurement):
                 value, expected = answer if isinstance(answer, tuple) else (answer, self.expected)
-                answer = self.judged(float(value), None if expected is None else float(expected))
+                answer = self.judge(float(value), None if expected is None else float(expected))
         except Exception as error:
             answer = Measurement(reason=f"{type(error).__name__}: {error}")
         return Row(
@@ -95,7 +95,7 @@ class Case:
         """Compile what the first case of a process would otherwise compile within its deadline."""
         getattr(load(self.module), "warm_up", lambda: None)()
 
-    def judged(self, value: float, expected: float | None) -> Measurement:
+    def judge(self, value: float, expected: float | None) -> Measurement:
         """Judge a number: it is ok where it is finite and within the tolerance of the expected one."""
         if not math.isfinite(value):
             return Measurement(reason=f"the measured number is {value}", expected=expected)

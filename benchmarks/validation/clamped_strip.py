@@ -32,15 +32,15 @@ ROWS = 2  # cells across a strip: narrow, so that the cross-section never has to
 
 @cache
 def exact_elastica(weight: float, load: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return s (n,) and (x, drop) (2, n) of the elastica of length 1. Raises as `integrated_elastica`."""
+    """Return s (n,) and (x, drop) (2, n) of the elastica of length 1. Raises as `solve_elastica`."""
     s = np.linspace(0, 1, 200)
     y = np.zeros((4, len(s)))  # theta, theta', x, drop
     for f in np.linspace(0.05, 1, 20):  # the load grows, each shape starting from the last
-        s, y = integrated_elastica(f * weight, f * load, s, y)
+        s, y = solve_elastica(f * weight, f * load, s, y)
     return s, y[2:]
 
 
-def integrated_elastica(
+def solve_elastica(
     weight: float, load: float, s: np.ndarray, y: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Solve the boundary value problem from the shape y (4, n), theta, theta', x and drop, at s (n,).

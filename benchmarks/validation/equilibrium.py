@@ -102,10 +102,10 @@ def order(error: Callable[[int], float], counts: Sequence[int], whole: float = 1
     >>> round(order(lambda n: 4.0 / n**2, (8, 16, 32)), 6)
     2.0
     """
-    return fitted_order([error(n) for n in counts], [whole / n for n in counts])
+    return fit_order([error(n) for n in counts], [whole / n for n in counts])
 
 
-def fitted_order(errors: Sequence[float], sizes: Sequence[float]) -> float:
+def fit_order(errors: Sequence[float], sizes: Sequence[float]) -> float:
     """Return the slope of log error over log size by least squares; nan for errors of zero or not finite."""
     if not (np.isfinite(errors).all() and np.min(errors) > 0):
         return float("nan")

@@ -31,7 +31,7 @@ DEADLINE = 60.0  # [s] for one step, after which its process is ended
 Start = Callable[[np.ndarray, np.random.Generator], np.ndarray]  # of positions (V, 3) [m]
 
 
-def perturbed(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
+def perturb(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
     """Return positions moved by a micrometre, enough to leave a saddle."""
     return x + random.normal(0, 1e-6, x.shape)
 
@@ -41,19 +41,19 @@ def noisy(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
     return x + random.normal(0, 2e-3, x.shape)
 
 
-def folded(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
+def fold(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
     """Return the half x > 0 turned up about the z axis by half a turn, perturbed."""
     arm = np.maximum(x[:, 0], 0.0)
     x[:, 0] += arm * (np.cos(np.pi) - 1.0)
     x[:, 1] += arm * np.sin(np.pi)
-    return perturbed(x, random)
+    return perturb(x, random)
 
 
-def twisted(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
+def twist(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
     """Return positions turned about the x axis, by more and more along it up to two turns, perturbed."""
     angle = 2 * np.pi * 2.0 * (x[:, 0] / np.ptp(x[:, 0]) + 0.5)
     x[:, 1], x[:, 2] = x[:, 2] * np.sin(angle), x[:, 2] * np.cos(angle)
-    return perturbed(x, random)
+    return perturb(x, random)
 
 
 def collapsed_triangle(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
@@ -69,10 +69,10 @@ STARTS: dict[str, Start] = {  # of the rest positions of a horizontal sheet abou
     "point": lambda x, random: np.zeros_like(x),
     "anywhere in 0.4 m": lambda x, random: random.uniform(-0.2, 0.2, x.shape),
     "anywhere in 40 m": lambda x, random: random.uniform(-20.0, 20.0, x.shape),
-    "squeezed to 30 %": lambda x, random: perturbed(x * [0.3, 1.0, 1.0], random),
-    "mirrored": lambda x, random: perturbed(x * [-1.0, 1.0, 1.0], random),
-    "folded by 180": folded,
-    "twisted": twisted,
+    "squeezed to 30 %": lambda x, random: perturb(x * [0.3, 1.0, 1.0], random),
+    "mirrored": lambda x, random: perturb(x * [-1.0, 1.0, 1.0], random),
+    "folded by 180": fold,
+    "twisted": twist,
     "collapsed triangle": collapsed_triangle,
 }
 VELOCITIES: dict[

@@ -241,13 +241,13 @@ def corner(side: str) -> tuple[float, float]:
 
     Edges on the border have no hinge, an error of first order in the cell: two meshes are extrapolated.
     """
-    coarse, fine = (lifted(rows, D) for rows in ANNULUS_ROWS)
+    coarse, fine = (lift_lip(rows, D) for rows in ANNULUS_ROWS)
     place = ("inner", "outer").index(side)
     return float((2 * fine - coarse)[place]), SZE[place]
 
 
 @cache
-def lifted(
+def lift_lip(
     rows: int, zero: float, material: sim.Material = ANNULUS_MATERIAL, family: str = "equilateral"
 ) -> np.ndarray:
     """Return the lifts [m] of the free lip's inner and outer corner, with so many rows of triangles.

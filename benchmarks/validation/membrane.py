@@ -24,7 +24,7 @@ from benchmarks.validation.equilibrium import (
     COTTON,
     DeadLoad,
     border,
-    fitted_order,
+    fit_order,
     flat_cloth,
     minimum,
 )
@@ -71,7 +71,7 @@ UNIAXIAL = np.diag([STRETCH, np.sqrt(1 - NARROWED * (STRETCH**2 - 1))])
 )  # fmt: skip
 def closed_form(state: str) -> float:
     """Return the energy of a homogeneous state of a rotated, unstructured patch over its closed form."""
-    cloth, points = _turned_patch()
+    cloth, points = _turn_patch()
     lam, mu = COTTON.lame_lambda, COTTON.lame_mu
     s, g, G = STRETCH, SHEAR, (STRETCH**2 - 1) / 2
     E2 = 4 * mu * (lam + mu) / (lam + 2 * mu)
@@ -86,7 +86,7 @@ def closed_form(state: str) -> float:
     return energies.StretchStVK(cloth).value_and_gradient(x)[0] / exact  # the patch has unit area
 
 
-def _turned_patch() -> tuple[sim.Cloth, np.ndarray]:
+def _turn_patch() -> tuple[sim.Cloth, np.ndarray]:
     points, faces = jittered_patch(8)
     return sim.Cloth(in_space(points) @ random_rotation(1).T, faces, COTTON), points
 
@@ -110,7 +110,7 @@ def constant(name: str, printed: float) -> tuple[float, float]:
 @known_answer(unit="N", expected=426.0 * 0.47e-3 * 9.81, tolerance=1e-12, reason="round-off")
 def weight_of_a_square_metre() -> float:
     """Return the weight of a square metre of cotton: 426 kg/m^3 times 0.47 mm times 9.81 m/s^2."""
-    cloth, _ = _turned_patch()
+    cloth, _ = _turn_patch()
     return float(energies.Gravity(cloth).value_and_gradient(cloth.rest_positions)[1][:, 1].sum())
 
 
@@ -165,14 +165,14 @@ def scikit_fem() -> dict[str, float]:
 )
 def rigid_motion_force() -> float:
     """Return the largest force in a flat patch after a rigid motion, hinges on."""
-    potential, x = _moved_patch()
+    potential, x = _move_patch()
     return float(np.abs(potential.gradient(x)).max())
 
 
 @known_answer(expected=0.0, tolerance=1e-11, reason="round-off of positions some metres from the origin")
 def rigid_invariance() -> float:
     """Return the relative change of the forces on a disordered patch under a rigid motion."""
-    potential, x = _moved_patch()
+    potential, x = _move_patch()
     x = x + np.random.default_rng(6).normal(0, 0.03, x.shape)
     turn = random_rotation(9)
     before, after = potential.gradient(x), potential.gradient(x @ turn.T + [0.5, -1.0, 2.0])
@@ -182,12 +182,12 @@ def rigid_invariance() -> float:
 @known_answer(expected=6.0, tolerance=0.0, reason="three translations and three rotations, no other")
 def rigid_zero_modes() -> float:
     """Return the number of zero eigenvalues of the Hessian of a flat patch, under 1e-9 of the largest."""
-    potential, x = _moved_patch()
+    potential, x = _move_patch()
     values = np.linalg.eigvalsh(potential.hessian(x).toarray())
     return float((np.abs(values) < 1e-9 * values[-1]).sum())
 
 
-def _moved_patch() -> tuple[sim.Potential, np.ndarray]:
+def _move_patch() -> tuple[sim.Potential, np.ndarray]:
     cloth = flat_cloth(*jittered_patch(5))
     potential = sim.Potential([energies.StretchStVK(cloth), energies.BendHinge(cloth)])
     return potential, cloth.rest_positions @ random_rotation(7).T + [1.0, 2.0, 3.0]
@@ -224,7 +224,7 @@ def orders() -> dict[str, float]:
     """Return the order in h of the error of positions or of the deformation gradient, in the mean square."""
     errors = [_errors(cells) for cells in MANUFACTURED_CELLS]
     sizes = [1 / cells for cells in MANUFACTURED_CELLS]
-    return {name: fitted_order([e[name] for e in errors], sizes) for name in errors[0]}
+    return {name: fit_order([e[name] for e in errors], sizes) for name in errors[0]}
 
 
 def _errors(cells: int) -> dict[str, float]:

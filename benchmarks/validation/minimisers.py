@@ -11,7 +11,7 @@ from benchmarks.validation.equilibrium import (
     demand_converged,
     ends,
     farthest,
-    fitted_order,
+    fit_order,
     flat_cloth,
     minimum,
 )
@@ -37,7 +37,7 @@ def newton_quadratic() -> float:
 @known_answer(expected=2.0, tolerance=0.4, reason="three steps are left between 1e-3 m and round-off")
 def newton_order() -> float:
     """Return the order of the last steps of Newton's method: slope of log error over log error before."""
-    potential, start = _stretched()
+    potential, start = _pull_sheet()
     end = minimum(potential.energies, start, tolerance=1e-13)
     errors = [
         float(
@@ -48,7 +48,7 @@ def newton_order() -> float:
         for k in range(1, 12)
     ]
     steps = [k for k in range(len(errors) - 1) if errors[k] < 1e-3 and errors[k + 1] > 1e-15]
-    return fitted_order([errors[k + 1] for k in steps], [errors[k] for k in steps])
+    return fit_order([errors[k + 1] for k in steps], [errors[k] for k in steps])
 
 
 @known_answer(expected=0.0, tolerance=1e-12, reason="round-off of the energy")
@@ -129,7 +129,7 @@ def newton_leaves_saddles() -> float:
 @known_answer(unit="m", expected=0.0, tolerance=1e-6, reason="2e-7, and 15 times that without its memory")
 def lbfgs_distance() -> float:
     """Return the distance of the end of 60 steps of L-BFGS to Newton's, where there is one minimiser."""
-    potential, start = _stretched()
+    potential, start = _pull_sheet()
     newton = minimum(potential.energies, start, tolerance=1e-12)
     result = sim.minimise(
         potential, start, "lbfgs", finish=False, max_iterations=LBFGS_STEPS, tolerance=1e-12
@@ -145,7 +145,7 @@ def _potential(cloth: sim.Cloth, *extras: energies.Energy) -> sim.Potential:
     return sim.Potential([energies.StretchStVK(cloth), energies.BendHinge(cloth), *extras])
 
 
-def _stretched() -> tuple[sim.Potential, np.ndarray]:
+def _pull_sheet() -> tuple[sim.Potential, np.ndarray]:
     """Return one step of a sheet pulled to 1.2 of its width: tension everywhere, and one minimiser."""
     points, faces = right_grid(8, 8, 0.3, 0.3)
     cloth = flat_cloth(points, faces, sim.Material(poisson_ratio=0.0), held=ends(points))

@@ -51,7 +51,7 @@ def folded(scaling: str, fold: float) -> float:
 
     Each of (COLUMNS - 1) ROWS upright edges holds k/2 fold^2, times l^2/(4 (A1 + A2)) where scaled.
     """
-    cloth, x = _folded(fold)
+    cloth, x = _fold(fold)
     edges = (COLUMNS - 1) * ROWS
     scale = _scale() if scaling == "length_area" else 1.0
     exact = edges * scale * cloth.material.bending_stiffness / 2 * fold**2
@@ -63,10 +63,10 @@ def hinges_past_half_a_turn() -> float:
     """Return the energy with rest angles of 3 rad and a fold of -3 rad: the short way is 2 pi - 6."""
     from reference_sim.energies.bend_hinge import dihedral_angles
 
-    cloth, x = _folded(-3.0)
+    cloth, x = _fold(-3.0)
     upright = np.ptp(cloth.rest_positions[cloth.hinges[:, :2], 0], axis=1) < 1e-9
     # The sign of a hinge's angle follows from its numbering; a fold of -3 is -3 or 3 there.
-    signs = np.sign(dihedral_angles(_folded(-0.1)[1], cloth.hinges))
+    signs = np.sign(dihedral_angles(_fold(-0.1)[1], cloth.hinges))
     angles = np.where(upright, -signs * 3.0, 0.0)
     bend = energies.BendHinge(cloth, rest_angles=angles)
     exact = upright.sum() * _scale() * cloth.material.bending_stiffness / 2 * (2 * np.pi - 6) ** 2
@@ -78,7 +78,7 @@ def hinges_past_half_a_turn() -> float:
 )
 def hinges_rest_shape_force() -> float:
     """Return the largest force in a strip whose rest angles are those of its folded shape, turned."""
-    cloth, x = _folded(0.8)
+    cloth, x = _fold(0.8)
     curved = sim.Cloth(x, cloth.faces, cloth.material)
     bend = energies.BendHinge(curved, rest_angles="rest")
     return float(np.abs(sim.Potential([bend]).gradient(x @ random_rotation(5).T)).max())
@@ -90,7 +90,7 @@ def _scale() -> float:
     return length**2 / (4 * CELL * length)
 
 
-def _folded(fold: float) -> tuple[sim.Cloth, np.ndarray]:
+def _fold(fold: float) -> tuple[sim.Cloth, np.ndarray]:
     points, faces = right_grid(ROWS, COLUMNS, DEPTH, COLUMNS * CELL)
     heading = fold * np.arange(COLUMNS)
     steps = CELL * np.stack([np.cos(heading), np.sin(heading)], axis=1)
@@ -112,7 +112,7 @@ C11 = {  # over k: of the families on which it is rational or sqrt(3)/2
 Terms = Callable[[sim.Cloth], Sequence[energies.Energy]]
 
 
-def _of(name: str, families: Sequence[str]) -> dict[str, dict[str, str]]:
+def _vary(name: str, families: Sequence[str]) -> dict[str, dict[str, str]]:
     """Return the variants of a known answer on families of triangles, with hinges unscaled and scaled."""
     return {
         f"{name}_{family}_{title}": {"family": family, "scaling": scaling}
@@ -121,9 +121,9 @@ def _of(name: str, families: Sequence[str]) -> dict[str, dict[str, str]]:
     }
 
 
-@known_answer(_of("plate_stiffness", ["delaunay"]), smoke=False, reason="reported: a mean of one patch")
+@known_answer(_vary("plate_stiffness", ["delaunay"]), smoke=False, reason="reported: a mean of one patch")
 @known_answer(
-    _of("plate_stiffness", [*C11]), smoke=False, tolerance=3e-4, reason="the corners leave (1/24)^2"
+    _vary("plate_stiffness", [*C11]), smoke=False, tolerance=3e-4, reason="the corners leave (1/24)^2"
 )
 def plate_stiffness(family: str, scaling: str) -> tuple[float, float | None]:
     """Return the C11/k of hinges, twice the energy per area of a patch bent to a cylinder."""

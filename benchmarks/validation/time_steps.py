@@ -29,7 +29,7 @@ def _pull(r: float) -> float:
     return RIGIDITY * ((r / HEIGHT) ** 2 - 1) * r / HEIGHT**2
 
 
-def _simulated_pendulum(
+def _swing_pendulum(
     start: np.ndarray, dt: float, frames: int, *, gravity: float = sim.GRAVITY
 ) -> np.ndarray:
     """Return the path (frames, 2) [m] of the free vertex across the base, from `start` (2,), at rest."""
@@ -57,7 +57,7 @@ def pendulum() -> float:
     path = [start, start]  # the one before the start: no velocity
     for _ in range(60):
         path.append(fsolve(balance, 2 * path[-1] - path[-2], (path[-2], path[-1]), xtol=1e-12))
-    return farthest(_simulated_pendulum(start, dt, 61), np.array(path[1:]))
+    return farthest(_swing_pendulum(start, dt, 61), np.array(path[1:]))
 
 
 @known_answer(
@@ -77,7 +77,7 @@ def time_step_order() -> float:
     exact = solve_ivp(rate, (0, end), [*start, 0.0, 0.0], rtol=1e-10, atol=1e-12).y[:2, -1]
 
     def error(n: int) -> float:
-        return float(np.linalg.norm(_simulated_pendulum(start, end / n, n + 1)[-1] - exact))
+        return float(np.linalg.norm(_swing_pendulum(start, end / n, n + 1)[-1] - exact))
 
     return order(error, (240, 480, 960), end)
 
@@ -96,10 +96,7 @@ def numerical_damping(frequency: float) -> tuple[float, float]:
     # omega^2 = 2 A (lambda/2 + mu)/(m h^2): made to fit by the step instead of the length.
     natural = np.sqrt(2 * RIGIDITY / MASS) / HEIGHT
     fitted_dt = dt * frequency / natural
-    path = (
-        _simulated_pendulum(np.array([HEIGHT + amplitude, 0.0]), fitted_dt, 31, gravity=0.0)[:, 0]
-        - HEIGHT
-    )
+    path = _swing_pendulum(np.array([HEIGHT + amplitude, 0.0]), fitted_dt, 31, gravity=0.0)[:, 0] - HEIGHT
     velocity = np.diff(path)[-1] / fitted_dt
     share = np.hypot(path[-1], velocity / natural) / amplitude
     return float(share), float((1 + (frequency * dt) ** 2) ** -15)

@@ -49,7 +49,7 @@ class PoseNetwork(Method):
         motion = self.worn.motion
         poses = torch.from_numpy(motion.poses.reshape(-1, 72)).float()
         offsets = torch.stack([self.network(pose) for pose in poses]).reshape(len(poses), -1, 3)
-        positions = self.dressed.skinned(motion, self.worn.betas, offsets=offsets)
+        positions = self.dressed.skin(motion, self.worn.betas, offsets=offsets)
         return Trajectory(positions, self.faces, np.arange(len(positions)) / motion.fps)
 
 

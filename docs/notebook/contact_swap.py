@@ -20,9 +20,9 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from benchmarks.assets import embedded_motions, open_assets
+from benchmarks.assets import make_motions, open_assets
 from benchmarks.methods.networks import Network
-from benchmarks.methods.reference_variants import of_own_energies
+from benchmarks.methods.reference_variants import swap_energies
 from benchmarks.methods.simulation import Simulation
 from benchmarks.metrics.energy import energy_series
 from benchmarks.presets import find_preset
@@ -55,7 +55,7 @@ def main() -> None:
     folder.mkdir(exist_ok=True)
     torch.set_num_threads(1)
     preset = find_preset("quick")
-    assets = open_assets(preset, embedded_motions(given.motions), ["tshirt"])
+    assets = open_assets(preset, make_motions(given.motions), ["tshirt"])
     dressed = DressedBody(assets.body, assets.garments["tshirt"])
     recipes = [RECIPES[name] for name in given.recipes]
     kept = [steps for steps in KEPT if steps <= given.steps]
@@ -75,7 +75,7 @@ def train(dressed: DressedBody, recipe: Recipe, kept: list[int], folder: Path) -
     """Train by the recipe and keep the weights after each of `kept` steps, unless the last are there."""
     if weights_file(folder, recipe.name, kept[-1]).exists():
         return
-    motions = embedded_motions(TRAIN)
+    motions = make_motions(TRAIN)
     trainer = Trainer("snug", dressed, motions, steps=kept[-1], seed=0, recipe=recipe)
 
     def keep(row: dict[str, float]) -> None:
@@ -89,9 +89,9 @@ def train(dressed: DressedBody, recipe: Recipe, kept: list[int], folder: Path) -
 
 def compare(scene: BuiltScene, motion: str, recipes: list[Recipe], kept: list[int], folder: Path) -> None:
     """Print excess and terms of all simulations and all sets of weights, by the energies of each recipe."""
-    scenes = {recipe.name: of_own_energies(scene, recipe) for recipe in recipes}
+    scenes = {recipe.name: swap_energies(scene, recipe) for recipe in recipes}
     dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
-    positions = {"skinning": dressed.skinned(scene.dressed.motion, smoothing=DEFAULT.smoothing)}
+    positions = {"skinning": dressed.skin(scene.dressed.motion, smoothing=DEFAULT.smoothing)}
     for name, own in scenes.items():
         path = folder / f"{motion}-{name}.npy"
         if not path.exists():

@@ -22,10 +22,10 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.assets import embedded_motions
+from benchmarks.assets import make_motions
 from benchmarks.methods.declared_networks import TRAININGS
-from benchmarks.methods.warm_started import given_frames
-from benchmarks.references import packaged_network
+from benchmarks.methods.warm_started import make_guess
+from benchmarks.references import find_in_package
 from benchmarks.timing import one_thread
 from reference_sim import cholesky, obstacle, potential
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
@@ -51,16 +51,16 @@ def dressed_body(vertices):
 
 def walking(vertices, guess=False, **options):
     """Return a function that simulates some frames of the walk, and returns seconds a frame."""
-    dressed, (walk,) = dressed_body(vertices), embedded_motions(["walk"])
+    dressed, (walk,) = dressed_body(vertices), make_motions(["walk"])
     body, cloth = dressed.body, dressed.garment.cloth()
     posed = body.vertices(walk.poses, walk.translations)
     terms = [StretchStVK(cloth), BendHinge(cloth), ContactPenalty(cloth), Gravity(cloth)]
     if guess:
-        frames = prepare_frames(TrainedModel.load(packaged_network("snug")), dressed, walk)
-        options["guess"] = given_frames(frames, None)
-    solid = obstacle.Obstacle(posed, body.faces, rest_positions=body.shaped())
+        frames = prepare_frames(TrainedModel.load(find_in_package("snug")), dressed, walk)
+        options["guess"] = make_guess(frames, None)
+    solid = obstacle.Obstacle(posed, body.faces, rest_positions=body.rest_vertices())
     stepper = TimeStepper(cloth, terms, dt=1 / 30, obstacle=solid, **options)
-    start = dressed.skinned(walk)[0]
+    start = dressed.skin(walk)[0]
 
     def run():
         state, begun = State(start, np.zeros_like(start)), time.thread_time()
@@ -74,7 +74,7 @@ def walking(vertices, guess=False, **options):
 def training():
     """Return a function that trains SNUG for some steps, and returns seconds a step."""
     trainer = Trainer(
-        "snug", dressed_body(1000), embedded_motions(TRAIN[:3]), steps=10_000, seed=0,
+        "snug", dressed_body(1000), make_motions(TRAIN[:3]), steps=10_000, seed=0,
         recipe=TRAININGS["snug"].recipe,
     )  # fmt: skip
     numbers = iter(range(10_000))
@@ -102,7 +102,7 @@ CASES = {
 }
 PARTS = (
     ("contact planes", obstacle.Obstacle, "planes"),
-    ("first guess", obstacle.Obstacle, "transported"),
+    ("first guess", obstacle.Obstacle, "transport"),
     ("float32 L-BFGS", compiled_lbfgs, "descend"),
     ("its factor", compiled_lbfgs, "precondition"),
     ("evaluations", potential.Potential, "value_and_gradient"),

@@ -11,14 +11,14 @@ from dataclasses import replace
 
 from benchmarks.results.run_folder import RunFolder
 from reports.finished_run import Run, read_run
-from reports.statistics.paper_claims import FAILS, HOLDS, Claim, judged
+from reports.statistics.paper_claims import FAILS, HOLDS, Claim, judge_claims
 
 
 def verdicts(run: Run, scenes: set[str]) -> dict[Claim, str]:
     """Return the verdict of each claim that these scenes can judge."""
     energies = run.frame_energies[run.frame_energies["scene"].isin(scenes)]
     part = replace(run, frame=run.frame[run.frame["scene"].isin(scenes)], frame_energies=energies)
-    return {line.claim: line.verdict for line in judged(part)}
+    return {line.claim: line.verdict for line in judge_claims(part)}
 
 
 def main(folder: str) -> None:

@@ -13,9 +13,9 @@ from collections import Counter
 
 import numpy as np
 
-from reports.statistics.effects import DIFFERENCE, EXCESS, effect, off_scale, on_scale
+from reports.statistics.effects import DIFFERENCE, EXCESS, effect, rescale, unscale
 from reports.statistics.means_and_spreads import Mean
-from reports.statistics.verdicts import standing
+from reports.statistics.verdicts import decide
 
 MEDIAN, SEEDS, CELLS, NOISE = 5.0, 0.1, 0.2, 0.3  # %; standard deviations of logarithms; %
 
@@ -46,14 +46,14 @@ def main() -> None:
         for spread in (0.5, 1.0, 1.5):
             random = np.random.default_rng(motions)
             many = excesses(random, 4000, 1000, spread)[0]
-            truth = {scale: np.mean(on_scale(many, scale)) for scale in (EXCESS, DIFFERENCE)}
+            truth = {scale: np.mean(rescale(many, scale)) for scale in (EXCESS, DIFFERENCE)}
             held = Counter()
             for _ in range(times):
                 one = mean_of(excesses(random, motions, 3, spread)[0], "one")
                 zero = mean_of(np.zeros((motions, 3)), "zero")
                 for scale in truth:
                     low, high = effect(one, zero, scale).interval
-                    held[scale] += low <= off_scale(truth[scale], scale) <= high
+                    held[scale] += low <= unscale(truth[scale], scale) <= high
             print(
                 "coverage", motions, spread, {scale: held[scale] / times for scale in truth}, flush=True
             )
@@ -63,7 +63,7 @@ def main() -> None:
             for _ in range(times // 4):
                 one, other = excesses(random, motions, 3, 1.0, factor)
                 far = effect(mean_of(one, "one"), mean_of(other, "other"), EXCESS)
-                found[standing(far, far.p_value())] += 1
+                found[decide(far, far.p_value())] += 1
             print("verdict", motions, factor, {k: v / (times // 4) for k, v in found.items()}, flush=True)
 
 

@@ -18,7 +18,7 @@ from functools import partial
 from pathlib import Path
 
 from benchmarks import MethodEntry
-from benchmarks.methods.reference_variants import of_own_energies
+from benchmarks.methods.reference_variants import swap_energies
 from benchmarks.methods.simulation import Simulation
 from snug.named_recipes import PAPER
 from snug.recipe import DEFAULT
@@ -46,4 +46,4 @@ METHODS = tuple(
 def make(*, models: Path, seed: int, replaced: tuple[str, ...]) -> Simulation:
     """Make the simulation with the recipe's contact, the fields `replaced` those of the default recipe."""
     recipe = replace(PAPER, **{option: getattr(DEFAULT, option) for option in replaced})
-    return Simulation(change=partial(of_own_energies, recipe=recipe))
+    return Simulation(change=partial(swap_energies, recipe=recipe))

@@ -15,7 +15,7 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks.assets import embedded_motions
+from benchmarks.assets import make_motions
 from benchmarks.timing import one_thread
 from snug.body.parametric_body import Body
 from snug.garments.templates import TSHIRT, find_template
@@ -54,10 +54,8 @@ def main():
     vertices = int(sys.argv[1]) if len(sys.argv) > 1 else 1000
     body = Body.load()
     dressed = DressedBody(body, find_template(TSHIRT).tailor(body, vertices=vertices))
-    motions = embedded_motions(TRAIN[:1])
-    skinned = {
-        motion.name: dressed.skinned(motion) for motion in motions
-    }  # for those that learn vertices
+    motions = make_motions(TRAIN[:1])
+    skinned = {motion.name: dressed.skin(motion) for motion in motions}  # for those that learn vertices
     square = np.ones((1024, 1024), np.float32)
     operations = 2 * 1024**3 / least(lambda: square @ square)  # a second
     print(f"{dressed.vertices} vertices; {operations / 1e9:.0f} GFLOP/s")

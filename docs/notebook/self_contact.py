@@ -17,7 +17,7 @@ import numpy as np
 from benchmarks.assets import open_assets
 from benchmarks.methods.simulation import Simulation
 from benchmarks.presets import find_preset
-from benchmarks.scenes import of_garment
+from benchmarks.scenes import find_garment
 from benchmarks.scenes.dressed_body import with_self_contact
 from benchmarks.timing import one_thread
 from snug.motion.library import make_motion
@@ -66,7 +66,7 @@ def main():
     garment, motion, frames = sys.argv[1], sys.argv[2], int(sys.argv[3])
     preset = find_preset("quick")
     assets = open_assets(preset, [make_motion(motion)], [garment])
-    scene = of_garment(garment).scene(motion).at(preset).build(assets)
+    scene = find_garment(garment).scene(motion).at(preset).build(assets)
     scene = dataclasses.replace(scene, frames=min(frames, scene.frames))
     measure(scene, f"{garment}, {motion}, without")
     apart = with_self_contact(scene.energies)

@@ -12,7 +12,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from benchmarks.validation.large_bending import ANNULUS_MATERIAL, SZE, D, lifted
+from benchmarks.validation.large_bending import ANNULUS_MATERIAL, SZE, D, lift_lip
 from benchmarks.validation.plates import plate_stiffness
 from reference_sim.kernels.fast_kernels import SlowPathWarning
 
@@ -26,7 +26,7 @@ def measure(
     stiffness = bend * D / plate_stiffness(family, "length_area")[0]
     young = stretch * ANNULUS_MATERIAL.young_modulus
     material = replace(ANNULUS_MATERIAL, young_modulus=young, bending_stiffness=stiffness)
-    lifts = lifted(rows, bend * D if zero else 0.0, material, family)
+    lifts = lift_lip(rows, bend * D if zero else 0.0, material, family)
     print(
         f"{family:12} {rows:4} {zero!s:6} {bend:5} {stretch:5}",
         lifts,

@@ -19,7 +19,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
-from benchmarks.assets import embedded_motions, open_assets
+from benchmarks.assets import make_motions, open_assets
 from benchmarks.methods.networks import Network
 from benchmarks.methods.simulation import Simulation
 from benchmarks.metrics.curvature import curvature_error, curvature_series, histogram_distance
@@ -51,7 +51,7 @@ def main() -> None:
     folder.mkdir(exist_ok=True)
     torch.set_num_threads(1)
     preset = find_preset("paper")
-    assets = open_assets(preset, embedded_motions(TEST), ["tshirt"])
+    assets = open_assets(preset, make_motions(TEST), ["tshirt"])
     dressed = DressedBody(assets.body, assets.garments["tshirt"])
     for name in NETWORKS:
         train(dressed, name, folder)
@@ -65,7 +65,7 @@ def train(dressed: DressedBody, name: str, folder: Path) -> None:
     if not path.exists():
         left_out, seed = NETWORKS[name]
         recipe = replace(PAPER, name=name, terms=tuple(term for term in TERMS if term != left_out))
-        trainer = Trainer("snug", dressed, embedded_motions(TRAIN), steps=STEPS, seed=seed, recipe=recipe)
+        trainer = Trainer("snug", dressed, make_motions(TRAIN), steps=STEPS, seed=seed, recipe=recipe)
         TrainingLoop(trainer, every=1000, progress=True).run().save(path)
 
 
@@ -77,7 +77,7 @@ def compare(scene: BuiltScene, motion: str, folder: Path) -> None:
         np.savez(path, simulation=simulated(scene), **finer)
     positions = dict(np.load(path))
     dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
-    positions["skinning"] = dressed.skinned(scene.dressed.motion, smoothing=DEFAULT.smoothing)
+    positions["skinning"] = dressed.skin(scene.dressed.motion, smoothing=DEFAULT.smoothing)
     for name in NETWORKS:
         network = Network(folder / f"{name}.safetensors")
         network.prepare(scene)

@@ -85,7 +85,7 @@ class ContactFriction(Energy):
         depth = np.maximum(self.contact.margin - gap, 0.0)
         return self.coefficient * 3 * self.contact.stiffness * depth**2
 
-    def _known_forces(self) -> np.ndarray:
+    def _demand_forces(self) -> np.ndarray:
         if self.forces is None:
             raise ValueError(
                 "ContactFriction does not know its normal force: prepare the step of the frame before first"
@@ -104,26 +104,26 @@ class ContactFriction(Energy):
         square, h = (slip**2).sum(-1), self.threshold
         y = torch.sqrt(torch.where(square > 0, square, torch.ones_like(square)))
         cubic = square / h - torch.where(square > 0, y**3, torch.zeros_like(y)) / (3 * h * h) + h / 3
-        return torch.as_tensor(self._known_forces()).to(u) * torch.where(square < h * h, cubic, y)
+        return torch.as_tensor(self._demand_forces()).to(u) * torch.where(square < h * h, cubic, y)
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
         gradient = np.zeros_like(x)
-        state = (self._known_forces(), self.anchors, self.normals, self.threshold)
+        state = (self._demand_forces(), self.anchors, self.normals, self.threshold)
         return _gradient(x, self.stencils, self.weights, *state, gradient), gradient
 
     def active_hessian_blocks(
         self, x: np.ndarray, convexity: float = 0.0
     ) -> tuple[np.ndarray, np.ndarray]:
         """Return the samples (n,) with second derivatives, and these (n, 9, 9) [N/m]; see Energy."""
-        forces = self._known_forces()
+        forces = self._demand_forces()
         elements = np.flatnonzero(forces)
         state = (forces, self.anchors, self.normals, self.threshold)
         return elements, _hessian(x, elements, self.stencils, self.weights, *state)
 
     def scalar_stiffness(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the curvature of sticking, 2 mu N / h, in every direction; see Energy."""
-        forces = self._known_forces()
+        forces = self._demand_forces()
         elements = np.flatnonzero(forces)
         w = self.weights[elements]
         curvature = 2 * forces[elements] / self.threshold

@@ -19,7 +19,7 @@ import scipy.sparse as sp
 
 from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy, Step, demand_positive
-from reference_sim.geometry.closest_point import halved
+from reference_sim.geometry.closest_point import arrange
 from reference_sim.kernels.fast_kernels import Constraints, VertexBlocks
 from reference_sim.kernels.kernel_cache import njit
 from reference_sim.kernels.lanes import FAST, THREE, Float32Lanes, empty_state, lay_out, to_blocks
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 def lanes(term: ContactPenalty) -> Float32Lanes:
     """Lay the samples of the term out, those of a block near each other; a step freezes planes and depths."""
-    order = halved(term.rest_samples)
+    order = arrange(term.rest_samples)
     stencils = term.stencils[order]
     vertices, constants = lay_out(stencils, term.weights[order], term.stiffness[order])
     weights = to_blocks(term.weights[order])  # in float64: a third of metres is no third in float32

@@ -88,7 +88,7 @@ class StretchStVK(Energy):
         if stress is None:
             stress = self._stress(x, np.zeros_like(x))
         if convexity > 0:
-            stress = _less_compressed(stress, 1 - convexity)
+            stress = _reduce_compression(stress, 1 - convexity)
         _hessian(
             x, self.stencils, self.Dm_inverse, self.areas, self.lam, self.mu, stress, places.slots,
             places.base, places.stride, data,
@@ -167,7 +167,7 @@ def _gradient(x, faces, Dm_inverse, areas, lam, mu, gradient):
 
 
 @njit(cache=True)
-def _less_compressed(stress, keep):
+def _reduce_compression(stress, keep):
     """Multiply the negative eigenvalues of stresses S00, S11, S01 (F, 3) by `keep`."""
     reduced = stress.copy()
     for f in range(len(stress)):

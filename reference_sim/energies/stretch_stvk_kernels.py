@@ -217,7 +217,7 @@ def _add_strain(x, e, corner, membrane, g, H, fa, fb):
     S00, S11, S01 = trace + 2.0 * mu * G00, trace + 2.0 * mu * G11, 2.0 * mu * G01
     b0, b1 = hat(Dm_inverse[e], corner)
     s0, s1 = S00 * b0 + S01 * b1, S01 * b0 + S11 * b1
-    P00, P11, P01 = _stretched(S00, S11, S01)
+    P00, P11, P01 = _drop_compression(S00, S11, S01)
     along = b0 * (P00 * b0 + P01 * b1) + b1 * (P01 * b0 + P11 * b1)
     bb = b0 * b0 + b1 * b1
     area = areas[e]
@@ -231,7 +231,7 @@ def _add_strain(x, e, corner, membrane, g, H, fa, fb):
 
 
 @njit(cache=True, inline="always")
-def _stretched(S00, S11, S01):
+def _drop_compression(S00, S11, S01):
     """Return the symmetric matrix S without its negative eigenvalues."""
     mean, half = 0.5 * (S00 + S11), 0.5 * (S00 - S11)
     radius = np.sqrt(half * half + S01 * S01)

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from reference_sim.given_files import regular
+from reference_sim.given_files import demand_file
 
 PLAIN_KINDS = "biufcSU"  # kinds of types: truths, numbers, text
 
@@ -32,7 +32,7 @@ def read_arrays(path: str | Path, names: Collection[str] | None = None) -> dict[
     path, name = Path(path), ""
     arrays = {}
     try:
-        with regular(path).open("rb") as stream, np.lib.npyio.NpzFile(stream) as archive:
+        with demand_file(path).open("rb") as stream, np.lib.npyio.NpzFile(stream) as archive:
             for name in archive.files:
                 if names is None or name in names:
                     arrays[name] = _plain(archive[name])
@@ -123,7 +123,7 @@ def read_pickled_arrays(path: str | Path, names: Collection[str]) -> dict[str, n
     path, name = Path(path), ""
     arrays = {}
     try:
-        with regular(path).open("rb") as stream:
+        with demand_file(path).open("rb") as stream:
             if (start := stream.read(1 << 16)).startswith(COMPRESSED) or JOBLIB in start:
                 fault = "was written by joblib" if JOBLIB in start else "is compressed"
                 raise ValueError(f"{fault}: load it by joblib.load and write its arrays by numpy.savez")

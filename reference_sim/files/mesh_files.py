@@ -132,10 +132,10 @@ def _paths(pattern: str) -> list[Path]:
     if len(kinds) != 1:
         held = f"meshes of several kinds ({', '.join(kinds)})" if kinds else "no mesh"
         raise MeshError(f"{pattern}: {held}: quote a pattern of one kind, as 'body_*.ply'")
-    return _in_order(paths)
+    return _sort(paths)
 
 
-def _in_order(paths: list[Path]) -> list[Path]:
+def _sort(paths: list[Path]) -> list[Path]:
     """Return frames in the order of the one number in which their names differ.
 
     Raises MeshError where they differ in something else, or where a number is missing or there twice.

@@ -56,14 +56,14 @@ def _read_obj(path: Path) -> Contents:
                     uv.append([float(fields[0]), float(fields[1]) if len(fields) > 1 else 0.0])
                 elif kind == "f":
                     corners = [[*word.split("/"), ""] for word in fields]
-                    polygons.append([_counted(c[0], len(points)) for c in corners])
-                    uv_polygons.append([_counted(c[1], len(uv)) if c[1] else -1 for c in corners])
+                    polygons.append([_resolve_index(c[0], len(points)) for c in corners])
+                    uv_polygons.append([_resolve_index(c[1], len(uv)) if c[1] else -1 for c in corners])
             except (ValueError, IndexError):
-                raise _not_understood(number, line) from None
+                raise _line_error(number, line) from None
     return points, polygons, uv, uv_polygons
 
 
-def _counted(text: str, count: int) -> int:
+def _resolve_index(text: str, count: int) -> int:
     """Return an index from 0 on: OBJ counts from 1, and from the last by -1. Raises ValueError."""
     number = _index(text)
     if number == 0:
@@ -79,7 +79,7 @@ def _index(text: str | float) -> int:
     return number
 
 
-def _not_understood(number: int, line: str) -> ValueError:
+def _line_error(number: int, line: str) -> ValueError:
     return ValueError(f"line {number} is not understood: {line.strip()[:60]!r}")
 
 
@@ -106,7 +106,7 @@ def _read_off(path: Path) -> Contents:
             elif len(polygons) < counts[1]:
                 polygons.append([_index(fields[1 + k]) for k in range(int(fields[0]))])
         except (ValueError, IndexError):
-            raise _not_understood(number, line) from None
+            raise _line_error(number, line) from None
     if [len(points), len(polygons)] != counts:
         raise ValueError(
             f"ends with {len(points)} vertices and {len(polygons)} faces, and states {counts}"

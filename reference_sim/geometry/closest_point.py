@@ -87,15 +87,15 @@ def search(some, points, samples, exact, mesh, pose, faces, barycentric, closest
                 if fitted[k // LANES] != pose.number:
                     fit_leaf(k // LANES, mesh, pose)
                 c0, c1, c2 = centroids[k, 0], centroids[k, 1], centroids[k, 2]
-                if not limited or _within(c0 - rest[at, 0], c1 - rest[at, 1], c2 - rest[at, 2], limit):
+                if not limited or _is_within(c0 - rest[at, 0], c1 - rest[at, 1], c2 - rest[at, 2], limit):
                     v, w, squared = closest_on_triangle(corners, k, x[g, 0], x[g, 1], x[g, 2])
                     if squared < np.inf:
                         best[g], answer[g], weights[g, 0], weights[g, 1] = squared, k, v, w
             scale[g] = size + max(abs(x32[0, g]), abs(x32[1, g]), abs(x32[2, g]))
-            useful[g] = _useful(best[g if g < count else 0], scale[g], exact)
+            useful[g] = _bound(best[g if g < count else 0], scale[g], exact)
             worst = max(worst, useful[g])
         number = min(first // LANES, len(starts) - 1)
-        near_count, nearest = _near_leaves(
+        near_count, nearest = _find_leaves(
             starts[number], stops[number], blocks, masks, boxes, x32, worst, gaps, leaves, bounds
         )
         if near_count > 0:  # the nearest first
@@ -117,7 +117,7 @@ def search(some, points, samples, exact, mesh, pose, faces, barycentric, closest
                     if out[LANES * g + lane] > useful[g] or k == answer[g]:
                         continue
                     c0, c1, c2 = centroids[k, 0], centroids[k, 1], centroids[k, 2]
-                    if limited and not _within(
+                    if limited and not _is_within(
                         c0 - rest[at, 0], c1 - rest[at, 1], c2 - rest[at, 2], limit
                     ):
                         continue
@@ -126,7 +126,7 @@ def search(some, points, samples, exact, mesh, pose, faces, barycentric, closest
                         squared == best[g] and answer[g] >= 0 and order[k] < order[answer[g]]
                     ):
                         best[g], answer[g], weights[g, 0], weights[g, 1] = squared, k, v, w
-                        useful[g] = _useful(squared, scale[g], exact)
+                        useful[g] = _bound(squared, scale[g], exact)
                         changed = True
             if changed:
                 worst = np.float32(0.0)
@@ -149,13 +149,13 @@ def search(some, points, samples, exact, mesh, pose, faces, barycentric, closest
 
 
 @njit(cache=True, error_model="numpy")
-def _within(x, y, z, limit):
+def _is_within(x, y, z, limit):
     """Return whether an offset is within the rule of regions, a squared distance."""
     return x * x + y * y + z * z <= limit
 
 
 @njit(cache=True, error_model="numpy")
-def _useful(squared, scale, exact):
+def _bound(squared, scale, exact):
     """Return the squared bound above which nothing is of use, once something is found at `squared` [m^2].
 
     scale: of the numbers that bounds are made of [m].
@@ -168,7 +168,7 @@ def _useful(squared, scale, exact):
 
 
 @njit(cache=True, fastmath=BOUND_MATH)
-def _near_leaves(start, stop, blocks, masks, boxes, x32, worst, gaps, leaves, bounds):
+def _find_leaves(start, stop, blocks, masks, boxes, x32, worst, gaps, leaves, bounds):
     """Write the listed leaves whose boxes are within `worst` [m^2] of the box of a group, and their bounds.
 
     Returns how many there are, and which of them is nearest.
@@ -178,7 +178,7 @@ def _near_leaves(start, stop, blocks, masks, boxes, x32, worst, gaps, leaves, bo
     for g in range(LANES):
         l0, l1, l2 = min(l0, x32[0, g]), min(l1, x32[1, g]), min(l2, x32[2, g])
         h0, h1, h2 = max(h0, x32[0, g]), max(h1, x32[1, g]), max(h2, x32[2, g])
-    zero, near_count, nearest = np.float32(0.0), 0, 0
+    zero, count, nearest = np.float32(0.0), 0, 0
     for n in range(start, stop):
         block, mask = blocks[n], masks[n]
         for lane in range(LANES):
@@ -190,11 +190,11 @@ def _near_leaves(start, stop, blocks, masks, boxes, x32, worst, gaps, leaves, bo
         while bits:
             lane = lowest_bit(bits)
             bits &= bits - 1
-            leaves[near_count], bounds[near_count] = LANES * block + lane, gaps[lane]
-            if bounds[near_count] < bounds[nearest]:
-                nearest = near_count
-            near_count += 1
-    return near_count, nearest
+            leaves[count], bounds[count] = LANES * block + lane, gaps[lane]
+            if bounds[count] < bounds[nearest]:
+                nearest = count
+            count += 1
+    return count, nearest
 
 
 @dataclass(frozen=True)
@@ -215,7 +215,7 @@ class FaceSearch:
 
     def __init__(self, faces: np.ndarray, centroids: np.ndarray) -> None:
         self.faces = np.ascontiguousarray(faces, dtype=np.int64)
-        order = halved(centroids)
+        order = arrange(centroids)
         place = np.argsort(order)
         leaves = -(-len(order) // LANES)
         order = np.append(order, np.repeat(order[-1], LANES * leaves - len(order)))
@@ -225,7 +225,7 @@ class FaceSearch:
         vertices = np.take_along_axis(self.faces[order], ascending, axis=1)
         blocks = -(-leaves // LANES)
         self._mesh = Mesh(
-            order, vertices, _each_once(vertices.reshape(leaves, -1)), ascending, place,
+            order, vertices, _drop_repeats(vertices.reshape(leaves, -1)), ascending, place,
             np.ascontiguousarray(centroids[order], np.float64), np.zeros((blocks, 6, LANES), np.float32),
             np.zeros(leaves, np.int64), np.zeros(leaves, np.int64), np.zeros((len(order), 3, 3)),
             np.zeros((9, LANES)), np.zeros((leaves, 5), np.float32),
@@ -246,14 +246,14 @@ class FaceSearch:
         self._pose = Pose(self._pose.number + 1, positions, origin)
         self._mesh.size[0] = 0.0
 
-    def listed(self, points: np.ndarray, region: float = np.inf) -> Listed:
+    def group(self, points: np.ndarray, region: float = np.inf) -> Listed:
         """Group samples at points (S, 3) [m], best at rest, and list the leaves that each group may meet.
 
         A sample meets only faces whose rest centroid lies no farther than `region` [m] from its point
         here; where there is none, all.
         """
         points = np.ascontiguousarray(points, np.float64)
-        order, whole = halved(points), self._everywhere
+        order, whole = arrange(points), self._everywhere
         if region == np.inf:
             return whole._replace(order=order)
         count, blocks = -(-len(points) // LANES), len(whole.blocks)
@@ -279,7 +279,7 @@ class FaceSearch:
         """Find the points of the mesh closest to points (S, 3) [m].
 
         hints: (S,) faces to begin with, -1 for none. They change the cost and, but for `exact`, no
-        answer. samples: as `listed` gives it for the samples; without, any face may be met. exact: [m] a
+        answer. samples: as `group` gives it for the samples; without, any face may be met. exact: [m] a
         sample farther away than this may get any point at most twice as far as the closest: a remembered
         face then often does, for a third of the cost.
         """
@@ -287,7 +287,7 @@ class FaceSearch:
         faces = np.full(len(points), -1) if hints is None else np.array(hints, np.int64)
         barycentric, closest = np.empty((len(points), 3)), np.empty((len(points), 3))
         if samples is None:
-            samples = self.listed(points)
+            samples = self.group(points)
         missed, mesh = np.empty(len(points), np.int64), self._mesh
         state = float(exact), mesh, self._pose, faces, barycentric, closest, missed
         lost = missed[: search(samples.order, points, samples, *state)].copy()
@@ -298,7 +298,7 @@ class FaceSearch:
         return Closest(faces, barycentric, closest)
 
 
-def _each_once(vertices: np.ndarray) -> np.ndarray:
+def _drop_repeats(vertices: np.ndarray) -> np.ndarray:
     """Return the different numbers of each row (L, n), filled up with the least to the longest of them."""
     rows = np.sort(vertices, axis=1)
     copies = rows[:, 1:] == rows[:, :-1]
@@ -313,7 +313,7 @@ def _boxes(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return low, high
 
 
-def halved(points: np.ndarray) -> np.ndarray:
+def arrange(points: np.ndarray) -> np.ndarray:
     """Order points (N, 3) so that each LANES of them lie together: halved again and again; returns (N,)."""
     count = len(points)
     order, starts = np.arange(count), np.array([0, count])

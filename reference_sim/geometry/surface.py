@@ -73,7 +73,7 @@ def _unit(x, y, z):
 
 
 @njit(cache=True, error_model="numpy")
-def _beyond(offset, c, face, weights, vertices, faces, starts, around):
+def _leads_nearer(offset, c, face, weights, vertices, faces, starts, around):
     """Return whether some face at c leads nearer along the unit offset; c is on a side or a corner of one."""
     sharing, lowest, corner = 0, 0.0, face[np.argmax(weights)]
     for f in around[starts[corner] : starts[corner + 1]]:
@@ -124,7 +124,7 @@ def plane_normals(points, closest, closest_faces, barycentric, vertices, faces, 
         untrusted = not (length > 1e-6 and np.abs(cosine) > 0.3)
         if cosine < -0.3 and min(u, v, w) <= ON_SIDE:
             face = faces[closest_faces[s]]
-            untrusted |= _beyond(
+            untrusted |= _leads_nearer(
                 (x, y, z), closest[s], face, barycentric[s], vertices, faces, starts, around
             )
         if untrusted:

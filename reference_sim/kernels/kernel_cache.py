@@ -69,7 +69,7 @@ def njit(**options: Any) -> Callable[[Any], Any]:
         finally:
             _config.CACHE_LOCATOR_CLASSES = locators
         if folder:
-            kernel.compile = _alone(kernel.compile, folder / f"{function.__qualname__}.lock")
+            kernel.compile = _guard(kernel.compile, folder / f"{function.__qualname__}.lock")
         return kernel
 
     return decorate
@@ -91,7 +91,7 @@ class KernelLocator(InTreeCacheLocator):
         return _digests[self._module]
 
 
-def _alone(compile_kernel: Callable[[Any], Any], lock: Path) -> Callable[[Any], Any]:
+def _guard(compile_kernel: Callable[[Any], Any], lock: Path) -> Callable[[Any], Any]:
     """Return the compilation of a kernel, for which other processes wait."""
 
     def compile_alone(signature: Any) -> Any:
@@ -158,7 +158,7 @@ def _call_from(first, terms, out, arguments):
 
 
 @overload(_call_from, prefer_literal=True)
-def _overloaded_call_from(first, terms, out, arguments):
+def _overload_call(first, terms, out, arguments):
     # A slice of the tuple of terms would count the references to all of its arrays at every call.
     at, after = first.literal_value, first.literal_value + 1
     if at == len(terms):
@@ -172,7 +172,7 @@ def _overloaded_call_from(first, terms, out, arguments):
     return implementation
 
 
-def with_types_resolved(kernel: Dispatcher, *arguments: object) -> Callable[[], object]:
+def resolve_types(kernel: Dispatcher, *arguments: object) -> Callable[[], object]:
     """Return a call of a compiled kernel with these arguments that looks up no types.
 
     For kernels among the arguments numba does so in Python at every call, which takes longer than a sweep

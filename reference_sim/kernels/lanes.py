@@ -191,20 +191,20 @@ def copy_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
     """
     lanes = LANES_FLOAT64 if source.dtype == types.float64 else L
 
-    def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         source_row = _place(context, builder, signature.args[:2], args[:2], lanes, lanes)
         target_row = _place(context, builder, signature.args[2:], args[2:], lanes, lanes)
         builder.store(builder.load(source_row, align=4), target_row, align=4)
         return context.get_dummy_value()
 
-    return types.void(source, i, target, j), built
+    return types.void(source, i, target, j), build
 
 
 @_intrinsic
 def add_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
     """Add row i of source to row j of target, which may also be one of float64."""
 
-    def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         numbers = builder.load(_place(context, builder, signature.args[:2], args[:2], L, L), align=4)
         place = _place(context, builder, signature.args[2:], args[2:], L, L)
         if signature.args[2].dtype == types.float64:
@@ -212,18 +212,18 @@ def add_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
         builder.store(builder.fadd(builder.load(place, align=4), numbers), place, align=4)
         return context.get_dummy_value()
 
-    return types.void(source, i, target, j), built
+    return types.void(source, i, target, j), build
 
 
 @_intrinsic
-def mixed_rows(_: Any, rows: Any, i: Any, j: Any, k: Any, u: Any, v: Any, w: Any) -> Any:
+def mix_rows(_: Any, rows: Any, i: Any, j: Any, k: Any, u: Any, v: Any, w: Any) -> Any:
     """Return u rows[i] + v rows[j] + w rows[k], three numbers.
 
     Rows of three lie in a flat float32 array, with one number more after the last: a row is loaded as
     four.
     """
 
-    def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         four, total = ir.VectorType(ir.FloatType(), 4), None
         for row, weight, kind in zip(args[1:4], args[4:], signature.args[1:4]):
             place = _place(context, builder, (rows, kind), (args[0], row), 3, 4)
@@ -236,7 +236,7 @@ def mixed_rows(_: Any, rows: Any, i: Any, j: Any, k: Any, u: Any, v: Any, w: Any
         parts = [builder.extract_element(total, ir.IntType(32)(n)) for n in range(3)]
         return context.make_tuple(builder, signature.return_type, parts)
 
-    return types.UniTuple(types.float32, 3)(rows, i, j, k, u, v, w), built
+    return types.UniTuple(types.float32, 3)(rows, i, j, k, u, v, w), build
 
 
 @_intrinsic
@@ -246,7 +246,7 @@ def bits_at_most(_: Any, rows: Any, i: Any, limit: Any) -> Any:
     rows: of WIDTH numbers in a flat float32 array.
     """
 
-    def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         place = _place(context, builder, signature.args[:2], args[:2], WIDTH, WIDTH)
         numbers = builder.load(place, align=4)
         limits = ir.Constant(numbers.type, ir.Undefined)
@@ -255,17 +255,17 @@ def bits_at_most(_: Any, rows: Any, i: Any, limit: Any) -> Any:
         within = builder.fcmp_unordered("<=", numbers, limits)
         return builder.zext(builder.bitcast(within, ir.IntType(WIDTH)), WIDE)
 
-    return types.int64(rows, i, types.float32), built
+    return types.int64(rows, i, types.float32), build
 
 
 @_intrinsic
 def lowest_bit(_: Any, bits: Any) -> Any:
     """Return the place of the lowest bit that is set in an integer other than zero."""
 
-    def built(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         return builder.cttz(args[0], ir.Constant(ir.IntType(1), 1))
 
-    return types.int64(types.int64), built
+    return types.int64(types.int64), build
 
 
 def _place(context: Any, builder: Any, kinds: Any, args: Any, size: int, loaded: int) -> Any:

@@ -202,7 +202,7 @@ class CompiledLBFGS:
     ) -> None:
         self.potential, self.max_iterations = potential, max_iterations
         self._terms = terms = step_terms(potential, "float32_lanes", "CompiledLBFGS")
-        self._lanes, self._places = _with_common(terms.kernels)
+        self._lanes, self._places = _add_common(terms.kernels)
         self._gradients = [kernel_argument(lanes.gradient) for lanes in self._lanes]
         self._weight = mean_weight(potential)
         self._tolerance = tolerance * self._weight
@@ -288,7 +288,7 @@ NOTHING: Any = SimpleNamespace(  # a term of any of these kinds, without element
 )  # fmt: skip
 
 
-def _with_common(kernels: tuple[Float32Lanes, ...]) -> tuple[list[Float32Lanes], list[int]]:
+def _add_common(kernels: tuple[Float32Lanes, ...]) -> tuple[list[Float32Lanes], list[int]]:
     """Return the kernels of terms beside empty ones of the common kinds that are absent; places of terms.
 
     So `descend` is compiled once for all cloths of these kinds.

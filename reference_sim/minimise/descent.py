@@ -228,7 +228,7 @@ class Descent:
         self.iterations += other.iterations
         self.factorisations += other.factorisations
 
-    def late(self, timeout: float) -> bool:
+    def is_late(self, timeout: float) -> bool:
         """Return whether more than `timeout` seconds have passed since the start."""
         return time.perf_counter() - self.started > timeout
 
@@ -282,7 +282,7 @@ def iterate(solver: Any, run: Descent) -> Stop:
             return stop
         if last:
             return Stop("max_iterations", f"gave up after {run.iterations} iterations")
-        if run.late(solver.timeout):
+        if run.is_late(solver.timeout):
             return Stop("timeout", f"gave up after {solver.timeout:g} s")
         if stop := solver.step(run):
             return stop

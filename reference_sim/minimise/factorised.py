@@ -47,8 +47,8 @@ class FactorisedHessian:
 
         Dynamic terms may need a wider pattern, analysed anew.
         """
-        changing = self._pattern.changing(x, convexity)
-        pattern = self._pattern.covering(changing)
+        changing = self._pattern.hessians(x, convexity)
+        pattern = self._pattern.widen(changing)
         if pattern is not self._pattern:
             self._pattern = pattern
             self._analyse()
@@ -114,7 +114,7 @@ def convergence_check(run: NewtonRun, values: np.ndarray, round_off: float) -> S
 
 def escape_saddle(run: NewtonRun, values: np.ndarray, length: float) -> bool:
     """Step along the most negative curvature, `length` [m] first; return whether the energy fell."""
-    v = most_negative(run, values)
+    v = find_lowest_mode(run, values)
     if v is None:
         return False
     v *= -1.0 if dot(v, run.g) > 0 else 1.0
@@ -130,7 +130,7 @@ def escape_saddle(run: NewtonRun, values: np.ndarray, length: float) -> bool:
     return False
 
 
-def most_negative(run: NewtonRun, values: np.ndarray) -> np.ndarray | None:
+def find_lowest_mode(run: NewtonRun, values: np.ndarray) -> np.ndarray | None:
     """Return the direction (3n,) of most negative curvature by inverse iteration, or None."""
     shift = 1.0
     while not run.factorise(values, shift):

@@ -100,7 +100,7 @@ class LBFGS:
         failure: Descent | None = None
         if self._newton is not None and self._compiled is not None:
             trial = Descent(self.potential, x0)
-            if self._in_float32(self._compiled, trial):
+            if self._run_in_float32(self._compiled, trial):
                 return self._newton.minimise(trial.x, after=trial)
             failure = trial
         run = LBFGSRun(self, x0)
@@ -125,7 +125,7 @@ class LBFGS:
             return None
         return Stop("stalled", "no step along the quasi-Newton direction lowers the energy")
 
-    def _in_float32(self, compiled: CompiledLBFGS, run: Descent) -> bool:
+    def _run_in_float32(self, compiled: CompiledLBFGS, run: Descent) -> bool:
         """Move `run` to where the compiled part ends; return whether Newton may go on from there.
 
         It may not if that is not below the start, if the start has no energy, or if nothing is left to it

@@ -147,7 +147,7 @@ class StepMinimiser:
             return replace(opened, terms=terms)
         if not free and potential.ccd_fraction(x, guess) == 1:
             x = guess
-        return _after(opened, self._approach(x, y))
+        return _merge(opened, self._approach(x, y))
 
     def _approach(self, x: np.ndarray, guess: np.ndarray) -> Result:
         """Minimise from `guess`, or from as near to it as terms that nothing may pass through let x come.
@@ -169,7 +169,7 @@ class StepMinimiser:
                 share = potential.ccd_fraction(x, goal)
                 if share == 1:
                     potential.search_again()
-                    return _after(*rough, self.minimise_from(goal))
+                    return _merge(*rough, self.minimise_from(goal))
                 if share >= max(shares, default=0.0):
                     part = APPROACH_SHARE * share
                     x, progress = x + part * (goal - x), progress + part * (1 - progress)
@@ -183,7 +183,7 @@ class StepMinimiser:
             late = time.perf_counter() - begun > self.options.get("timeout", float("inf"))
             if progress - history[max(len(history) - 4, 0)] < LEAST_APPROACH and len(history) > 3:
                 break
-        result = _after(*rough, self.minimise_from(x))
+        result = _merge(*rough, self.minimise_from(x))
         if result.status == "diverged":
             return result
         status = max("stalled", "timeout" if late else result.status, key=STATUSES.__getitem__)
@@ -197,7 +197,7 @@ class StepMinimiser:
         return make_minimiser(self.potential, **options)
 
 
-def _after(*results: Result) -> Result:
+def _merge(*results: Result) -> Result:
     """Return the last result with the counts of all."""
     return replace(
         results[-1],

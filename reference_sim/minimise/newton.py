@@ -213,7 +213,7 @@ class NewtonRun(Descent):
                 self.projection_level, self.raised = projection, projection > level
                 self.watchdog_steps = WATCHDOG_STEPS
                 return True
-            if k == limit or self.late(self.newton.timeout):
+            if k == limit or self.is_late(self.newton.timeout):
                 break
             p, projection = self.direction(self.assemble(CONVEXITY[projection]), projection)
             self.iterations += 1

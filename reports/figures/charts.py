@@ -25,21 +25,21 @@ from reports.figures.plotting import (
     power_text,
     style,
 )
-from reports.finished_run import Run, shown_seeds
+from reports.finished_run import Run, pick_seeds
 from reports.statistics.means_and_spreads import value_of
 from reports.statistics.outcomes import leads
 from reports.statistics.pareto import (
     ERRORS,
     Point,
-    compared_cells,
     error_points,
     front,
-    indistinct,
+    noise_floor,
     run_time,
+    select_plot_cells,
     time_label,
 )
-from reports.statistics.relative_excess import RELATIVE_EXCESS, SKINNING, with_relative_excess
-from reports.tables.table import scene_in_words
+from reports.statistics.relative_excess import RELATIVE_EXCESS, SKINNING, add_excess
+from reports.tables.table import name_scene
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -167,12 +167,12 @@ def _draw_marker(axes: Axes, point: Point, marker: str, colour: str, *, pale: bo
 
 def error_of_page_one(run: Run) -> Drawing | None:
     """Draw an error of the leading scene in one wide panel: the first that tells two methods apart."""
-    frame, scenes = compared_cells(run)
+    frame, scenes = select_plot_cells(run)
     for scene in scenes:
         rows = frame[frame["scene"] == scene]
         for name in ERRORS:
             points = error_points(run, rows, name)
-            band = indistinct(run, rows, name)
+            band = noise_floor(run, rows, name)
             if sum(p.error > _floor(points, band) for p in points) > 1:
                 return _draw_page_one(run, rows, run.metrics[name], points, band)
     return None
@@ -195,7 +195,7 @@ def _draw_page_one(
         entries.append(Style(run.label(run.reference), "black", "", ":"))
     axes.set(xlabel=time_label(time), ylabel=metric.heading)
     fit(figure, entries, markers=True)
-    scene = scene_in_words(rows["scene"].iloc[0])
+    scene = name_scene(rows["scene"].iloc[0])
     caption = f"{scene}: lower left is better. Pale line: the best at each time."
     for solvers in (c for c in curves if c.look is SOLVERS):
         first, last = (run.label(solvers.points[end].method) for end in (0, -1))
@@ -203,7 +203,7 @@ def _draw_page_one(
         caption += "; faint: solvers that another beats in both." if solvers.aside else "."
     caption += " Grey: within the reference's uncertainty." if band > axes.get_ylim()[0] else ""
     if below:
-        names = ", ".join(run.label(method) for method in run.ordered(below))
+        names = ", ".join(run.label(method) for method in run.order(below))
         caption += f" Zero or below the panel: {names}."
     return Drawing(figure, "error_against_time", caption)
 
@@ -213,7 +213,7 @@ MOST_ROWS, ROW = 15, 0.19  # methods, and inches of each
 
 def excess_by_motion(run: Run) -> Drawing | None:
     """Draw relative excess: a row for each method of each garment, a dot for each motion."""
-    rows = with_relative_excess(run, run.garment_rows)
+    rows = add_excess(run, run.garment_rows)
     rows = rows[(rows["metric"] == RELATIVE_EXCESS.name) & rows["usable"]]
     rows = rows[~rows["method"].isin([*run.with_role("reference", OF_REFERENCE), SKINNING])]
     excesses = rows.groupby(["garment", "method", "scene"])["value"].mean()
@@ -265,7 +265,7 @@ def energy_series(run: Run) -> Drawing | None:
         axes.set(title=term.capitalize(), xlabel="time [s]")
     panels[0].set_ylabel("energy [J]")
     fit(figure, [style(run, method) for method in methods])
-    caption = f"{scene_in_words(scene)}: energy of each frame by term. A frame without energy is a gap."
+    caption = f"{name_scene(scene)}: energy of each frame by term. A frame without energy is a gap."
     return Drawing(figure, f"energy_series_{file_name(scene)}", caption)
 
 
@@ -275,5 +275,5 @@ def _frames(run: Run) -> tuple[str, pd.DataFrame]:
     if frames.empty:
         return "", frames
     scene = str(frames["scene"].iloc[0])
-    seeds = shown_seeds(run.frame[run.frame["scene"] == scene]).loc[scene]
+    seeds = pick_seeds(run.frame[run.frame["scene"] == scene]).loc[scene]
     return scene, frames[(frames["scene"] == scene) & (frames["seed"] == frames["method"].map(seeds))]

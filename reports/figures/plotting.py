@@ -189,7 +189,7 @@ def power_text(value: float) -> str:
     return f"{mantissa}e{int(power)}"
 
 
-def printable(text: str) -> str:
+def escape(text: str) -> str:
     """Return the text with letters that the typesetter's fonts do not have as "U+88FE"."""
     missing = {c for c in text if c.isalpha() and not c.isascii()} - _letters()
     return text.translate({ord(c): f"U+{ord(c):04X}" for c in missing})
@@ -205,7 +205,7 @@ def _letters() -> frozenset[str]:
 
 def file_name(text: str) -> str:
     """Return a scene's or method's name as part of a file name, in letters that the report's text keeps."""
-    return "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in printable(text))
+    return "".join(letter if letter.isalnum() or letter in "-_" else "-" for letter in escape(text))
 
 
 def _legend(figure: Canvas, entries: Sequence[Style], columns: int) -> Legend:

@@ -20,9 +20,9 @@ from benchmarks.metrics.curvature import curvature_series
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.obstacle import Obstacle
 from reference_sim.trajectory import Trajectory
-from reports.finished_run import STEP, Run, shown_seeds
+from reports.finished_run import STEP, Run, pick_seeds
 from reports.statistics.outcomes import leads
-from reports.tables.table import scene_in_words
+from reports.tables.table import name_scene
 
 STEPS = 2**16 - 1
 FINEST = 1e-4  # [m] of a step: nothing finer is seen, and noise does not deflate
@@ -73,7 +73,7 @@ class Pack:
 
     def text(self) -> str:
         """Return all arrays, in letters that mean nothing to a browser."""
-        return deflated(b"".join(self.parts))
+        return deflate(b"".join(self.parts))
 
 
 def residuals(steps: np.ndarray) -> np.ndarray:
@@ -88,7 +88,7 @@ def residuals(steps: np.ndarray) -> np.ndarray:
     return ((signed << 1) ^ (signed >> 15)).view(np.uint16)
 
 
-def deflated(data: bytes) -> str:
+def deflate(data: bytes) -> str:
     """Return data in zlib's format, in base64."""
     return base64.b64encode(zlib.compress(data, 6)).decode("ascii")
 
@@ -103,7 +103,7 @@ def groups(folder: RunFolder, run: Run) -> Iterator[tuple[str, dict[str, int]]]:
     Those of a scene come in one or two groups.
     """
     cells = run.cells()
-    seeds = shown_seeds(cells)
+    seeds = pick_seeds(cells)
     first = leads(run, cells)
     traits = cells.drop_duplicates("scene").set_index("scene")[["garment", "part"]]
     kinds: list[list[str]] = [[], [], []]
@@ -111,7 +111,7 @@ def groups(folder: RunFolder, run: Run) -> Iterator[tuple[str, dict[str, int]]]:
         kinds[1 if part == "clip" else 0 if garment else 2].append(str(scene))
     for leading in (True, False):
         for scene in (scene for scenes in kinds for scene in scenes):
-            firsts = {m: int(seeds[scene, m]) for m in run.ordered(seeds[scene].index)}
+            firsts = {m: int(seeds[scene, m]) for m in run.order(seeds[scene].index)}
             stored = {
                 m: s for m, s in firsts.items()
                 if (m in first) is leading and folder.trajectory_path(scene, m, s).is_file()
@@ -164,11 +164,11 @@ def embed(folder: RunFolder, run: Run, budget: int) -> Embedded:
             texts: dict[str, str] = {}
             earlier = embedded.scenes.get(scene)
             record = earlier or {
-                "title": scene_in_words(scene), "methods": {},
-                "body": _kept(texts, _body(body)) if body else None,
+                "title": name_scene(scene), "methods": {},
+                "body": _keep(texts, _body(body)) if body else None,
             }  # fmt: skip
             pack = _cloth(cloth, references[scene], depths.get(method), run.metrics)
-            entry = _kept(texts, pack) | {"ending": _ending(cloth)}
+            entry = _keep(texts, pack) | {"ending": _ending(cloth)}
             new = {name: text for name, text in texts.items() if name not in embedded.texts}
             budget -= sum(ROOM + len(text) for text in new.values())
             if budget < 0:
@@ -179,7 +179,7 @@ def embed(folder: RunFolder, run: Run, budget: int) -> Embedded:
     return embedded
 
 
-def _kept(texts: dict[str, str], pack: Pack) -> dict[str, Any]:
+def _keep(texts: dict[str, str], pack: Pack) -> dict[str, Any]:
     """Keep a pack under a name of its content, so that one body of two garments is kept once."""
     text = pack.text()
     name = "b" + hashlib.sha256(text.encode()).hexdigest()[:16]
@@ -202,7 +202,7 @@ def _cloth(
     pack.positions("positions", cloth.positions)
     curvature = curvature_series(cloth.positions, faces)
     pack.values("curvature", np.where(curvature.area > 0.0, curvature.curvature, 0.0))  # 0 on boundaries
-    if reference is not None and _comparable(cloth, reference):
+    if reference is not None and _can_compare(cloth, reference):
         offsets = cloth.positions - reference.positions[: cloth.frames]
         pack.values("distance", MM * np.linalg.norm(offsets, axis=-1))
     if depths is not None:
@@ -215,7 +215,7 @@ def _cloth(
     return pack
 
 
-def _comparable(cloth: Trajectory, reference: Trajectory) -> bool:
+def _can_compare(cloth: Trajectory, reference: Trajectory) -> bool:
     same = np.array_equal(cloth.faces, reference.faces) and cloth.frames <= reference.frames
     return same and np.allclose(cloth.times, reference.times[: cloth.frames])
 

@@ -19,11 +19,11 @@ from reference_sim.files.atomic_files import replacing
 from reports.blocks import BLOCKS, Heading, Report, TableBlock
 from reports.figures.plotting import style
 from reports.finished_run import Run
-from reports.page.embedded_roll_outs import BUDGET, Embedded, deflated, embed
+from reports.page.embedded_roll_outs import BUDGET, Embedded, deflate, embed
 from reports.sentences import headline
 from reports.statistics.effects import Effect
 from reports.statistics.means_and_spreads import Mean, value_of
-from reports.statistics.pareto import ERRORS, error_points, indistinct, run_time, time_label
+from reports.statistics.pareto import ERRORS, error_points, noise_floor, run_time, time_label
 from reports.tables.table import Cell, Column, Table, column_texts, remarks_below
 
 
@@ -60,7 +60,7 @@ def _panel(run: Run, rows: pd.DataFrame, metric: str) -> dict[str, Any] | None:
         return None
     return {
         "title": run.metrics[metric].heading, "definition": run.metrics[metric].definition,
-        "band": indistinct(run, rows, metric),
+        "band": noise_floor(run, rows, metric),
         "points": [[p.method, p.time, p.error, p.time_spread, p.error_spread] for p in points],
     }  # fmt: skip
 
@@ -155,10 +155,10 @@ def write_page(folder: RunFolder, report: Report, *, budget: int = BUDGET) -> Pa
 
 def _page(report: Report, content: dict[str, Any], embedded: Embedded) -> str:
     data = json.dumps(content, ensure_ascii=False, allow_nan=False, separators=(",", ":"))
-    blobs = {"content": deflated(data.encode()), **embedded.texts}
+    blobs = {"content": deflate(data.encode()), **embedded.texts}
     sentences = {topic: html.escape(text) for topic, text in headline(report.run)}
     verdict, remarks = sentences.pop("Verdict", ""), sentences.items()
-    return filled(
+    return fill_page(
         "page.html",
         SCRIPTS,
         subtitle=html.escape(report.subtitle),
@@ -171,7 +171,7 @@ def _page(report: Report, content: dict[str, Any], embedded: Embedded) -> str:
     )
 
 
-def filled(name: str, scripts: Sequence[str], **values: str) -> str:
+def fill_page(name: str, scripts: Sequence[str], **values: str) -> str:
     """Return a template of this folder with its style, these scripts in their order, and values."""
     style = (HERE / "page.css").read_text(encoding="utf-8")
     code = "".join((HERE / f"{script}.js").read_text(encoding="utf-8") for script in scripts)

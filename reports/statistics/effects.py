@@ -22,26 +22,26 @@ RATIO, EXCESS, DIFFERENCE = "ratio", "excess", "difference"  # scales
 RANGE = "range"  # what the limits of a cost are
 
 
-def on_scale(values: np.ndarray | float, scale: str) -> np.ndarray | float:
+def rescale(values: np.ndarray | float, scale: str) -> np.ndarray | float:
     """Return values on a scale where effects add up: logarithm, arcsinh(x / SOFTENING), or as they are.
 
-    >>> on_scale(1.0, RATIO), on_scale(0.0, EXCESS), on_scale(2.0, DIFFERENCE)
+    >>> rescale(1.0, RATIO), rescale(0.0, EXCESS), rescale(2.0, DIFFERENCE)
     (0.0, 0.0, 2.0)
     """
     if scale == RATIO:
-        return _plain(np.log(values))
-    return _plain(np.arcsinh(np.divide(values, SOFTENING))) if scale == EXCESS else values
+        return _unwrap(np.log(values))
+    return _unwrap(np.arcsinh(np.divide(values, SOFTENING))) if scale == EXCESS else values
 
 
-def off_scale(values: np.ndarray | float, scale: str) -> np.ndarray | float:
-    """Return what `on_scale` makes these values of."""
+def unscale(values: np.ndarray | float, scale: str) -> np.ndarray | float:
+    """Return what `rescale` makes these values of."""
     if scale == RATIO:
         with np.errstate(over="ignore"):  # a few seeds of what broke can leave the upper end open
-            return _plain(np.exp(values))
-    return _plain(SOFTENING * np.sinh(values)) if scale == EXCESS else values
+            return _unwrap(np.exp(values))
+    return _unwrap(SOFTENING * np.sinh(values)) if scale == EXCESS else values
 
 
-def _plain(values: np.ndarray | np.floating) -> np.ndarray | float:
+def _unwrap(values: np.ndarray | np.floating) -> np.ndarray | float:
     return float(values) if np.ndim(values) == 0 else np.asarray(values)
 
 
@@ -89,7 +89,7 @@ class Effect:
     @property
     def shown(self) -> float:
         """Ratio of geometric means; points of skinning's excess; or difference of means."""
-        return self._shown(self.value)
+        return self._unscale(self.value)
 
     @property
     def interval(self) -> tuple[float, float] | None:
@@ -98,7 +98,7 @@ class Effect:
         Of points it is `ends` with the mean nearer to 0 held, though that mean is uncertain too.
         """
         ends = self.ends
-        return None if ends is None else (self._shown(ends[0]), self._shown(ends[1]))
+        return None if ends is None else (self._unscale(ends[0]), self._unscale(ends[1]))
 
     @property
     def ends(self) -> tuple[float, float] | None:
@@ -123,12 +123,12 @@ class Effect:
 
         if self.error is None:
             return None
-        distance = abs(self.above(factor))
+        distance = abs(self.gap(factor))
         if self.error == 0.0:  # every motion has the same factor between the two
             return 1.0 if distance == 0.0 else self.least_p
         return max(self.least_p, float(2.0 * stats.t.sf(distance / self.error, self.freedom)))
 
-    def above(self, factor: float = 1.0) -> float:
+    def gap(self, factor: float = 1.0) -> float:
         """Return how far `factor` times the first is above the second, on the scale."""
         return self.value + self.shift(factor)
 
@@ -136,7 +136,7 @@ class Effect:
         """Return by how much `factor` times the first moves it on the scale."""
         return math.log(factor) if self.scale == RATIO else 0.0
 
-    def equal(self, factor: float = 1.0) -> bool:
+    def is_equal(self, factor: float = 1.0) -> bool:
         """Return whether all of the interval lies within the margin; a value without one never does.
 
         It has to with each simulation of smaller time steps in the reference's place.
@@ -145,20 +145,20 @@ class Effect:
         ends = [end + self.shift(factor) for end in self.ends or ()]
         return bool(ends) and all(abs(end + change) <= self.margin for end in ends for change in moved)
 
-    def turned_by(self, factor: float = 1.0) -> list[str]:
+    def find_reversals(self, factor: float = 1.0) -> list[str]:
         """Return the simulations with smaller time steps against which the effect has the other sign."""
-        above = self.above(factor)
-        return [name for name, change in self.against.items() if (above + change) * above <= 0.0]
+        gap = self.gap(factor)
+        return [name for name, change in self.against.items() if (gap + change) * gap <= 0.0]
 
-    def _shown(self, value: float) -> float:
+    def _unscale(self, value: float) -> float:
         if self.scale == EXCESS:  # points between typical shares of the two
             first, second = self.second + self.value, self.second
             # The mean nearer to 0 stays and the other moves: so it is the same in either order.
             first, second = (
                 (first, first - value) if abs(first) < abs(second) else (second + value, second)
             )
-            return float(off_scale(first, EXCESS)) - float(off_scale(second, EXCESS))
-        return float(off_scale(value, self.scale))
+            return float(unscale(first, EXCESS)) - float(unscale(second, EXCESS))
+        return float(unscale(value, self.scale))
 
     @property
     def _quantile(self) -> float:
@@ -184,9 +184,9 @@ def effect(one: Mean, other: Mean, scale: str = "", *, unit: float | None = None
     2007, "The pigeonhole bootstrap"). Degrees of freedom are Satterthwaite's (1946). A network of one seed
     is taken to have the scatter of the one beside it.
     """
-    scale = scale or (RATIO if _positive(one) and _positive(other) else DIFFERENCE)
+    scale = scale or (RATIO if _is_positive(one) and _is_positive(other) else DIFFERENCE)
     first, second = (_grid(mean, scale) for mean in (one, other))
-    grids = _drawn_alike(one, other, first, second)
+    grids = _pair_seeds(one, other, first, second)
     repeated = {
         "motions": any((grid != grid[:1]).any() for grid in grids),
         "seeds": any((grid != grid[:, :1]).any() for grid in grids),
@@ -202,11 +202,11 @@ def effect(one: Mean, other: Mean, scale: str = "", *, unit: float | None = None
         freedom=freedom,
         covers=" and ".join(name for name, several in repeated.items() if several),
         motions=len(first),
-        uncertainty=_unpaired(one, other, scale) if spread is None else spread,
+        uncertainty=_add_noises(one, other, scale) if spread is None else spread,
         against=trend(changes),
         unit=max(abs(one.value), abs(other.value)) if unit is None else unit,
         complete=one.complete and other.complete,
-        one_seed=_one_seed(one, other) or _one_seed(other, one),
+        one_seed=_has_one_seed(one, other) or _has_one_seed(other, one),
     )
 
 
@@ -216,9 +216,9 @@ def cost_effect(one: Mean, other: Mean, *, exact: bool = False) -> Effect:
     A run time depends on the machine and on the motion, not on chance that another draw would repeat.
     exact: see Effect.
     """
-    scale = RATIO if _positive(one) and _positive(other) else DIFFERENCE
+    scale = RATIO if _is_positive(one) and _is_positive(other) else DIFFERENCE
     gaps = [
-        float(on_scale(first, scale)) - float(on_scale(second, scale))
+        float(rescale(first, scale)) - float(rescale(second, scale))
         for (scene, _), first in one.cells.items()
         for (place, _), second in other.cells.items()
         if place == scene
@@ -227,11 +227,11 @@ def cost_effect(one: Mean, other: Mean, *, exact: bool = False) -> Effect:
     return replace(effect(one, other, scale), error=None, limits=limits, covers=RANGE, exact=exact)
 
 
-def _positive(mean: Mean) -> bool:
+def _is_positive(mean: Mean) -> bool:
     return all(value > 0.0 for value in mean.cells.values())
 
 
-def _one_seed(mean: Mean, other: Mean) -> bool:
+def _has_one_seed(mean: Mean, other: Mean) -> bool:
     """Return whether the mean is of one seed and the other one does not show how seeds scatter."""
     return mean.seeded and mean.seeds == 1 and not (other.seeded and other.seeds > 1)
 
@@ -255,10 +255,10 @@ def _changes(one: Mean, other: Mean, scale: str) -> dict[str, float]:
     shared = set.intersection(*members.values()) if members else set()
     if 2 * len(shared) <= len(scenes):
         return {}
-    return {n: _moved_by(one, n, scale, shared) - _moved_by(other, n, scale, shared) for n in members}
+    return {n: _change_of(one, n, scale, shared) - _change_of(other, n, scale, shared) for n in members}
 
 
-def _unpaired(one: Mean, other: Mean, scale: str) -> float:
+def _add_noises(one: Mean, other: Mean, scale: str) -> float:
     """Return the noise where single changes are unknown, as between two runs: both add up as independent."""
     slopes = [_slope(mean, scale) for mean in (one, other)]
     return math.hypot(*(slope * (mean.uncertainty or 0.0) for slope, mean in zip(slopes, (one, other))))
@@ -271,7 +271,7 @@ def _slope(mean: Mean, scale: str) -> float:
     return 1.0 / abs(mean.value) if scale == RATIO else 1.0
 
 
-def _moved_by(mean: Mean, name: str, scale: str, scenes: Collection[str]) -> float:
+def _change_of(mean: Mean, name: str, scale: str, scenes: Collection[str]) -> float:
     """Return by how much a member of the family changes the mean over these scenes."""
     changes: dict[tuple[str, int], float] = {}
     for cell, value in mean.cells.items():
@@ -281,7 +281,7 @@ def _moved_by(mean: Mean, name: str, scale: str, scenes: Collection[str]) -> flo
         if scale == RATIO and moved <= 0.0:  # no logarithm: to first order
             changes[cell] = moved / value - 1.0
         else:
-            changes[cell] = float(on_scale(moved, scale)) - float(on_scale(value, scale))
+            changes[cell] = float(rescale(moved, scale)) - float(rescale(value, scale))
     return float(np.mean(list(mean_by_recording(changes).values())))
 
 
@@ -299,12 +299,12 @@ def is_recorded(scene: str) -> bool:
 
 def _grid(mean: Mean, scale: str) -> np.ndarray:
     """Return (M,S): value of each recording with each seed on the scale, both in order."""
-    cells = mean_by_recording({cell: float(on_scale(value, scale)) for cell, value in mean.cells.items()})
+    cells = mean_by_recording({cell: float(rescale(value, scale)) for cell, value in mean.cells.items()})
     recordings, seeds = (sorted(set(names)) for names in zip(*cells))
     return np.array([[cells[recording, seed] for seed in seeds] for recording in recordings])
 
 
-def _drawn_alike(one: Mean, other: Mean, first: np.ndarray, second: np.ndarray) -> list[np.ndarray]:
+def _pair_seeds(one: Mean, other: Mean, first: np.ndarray, second: np.ndarray) -> list[np.ndarray]:
     """Return grids (M,S) whose means add up to the effect, each with seeds of its own."""
     seeds = [{seed for _, seed in mean.cells} for mean in (one, other)]
     if one.pairing_group and one.pairing_group == other.pairing_group and seeds[0] == seeds[1]:

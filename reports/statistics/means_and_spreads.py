@@ -169,7 +169,7 @@ def value_of(frame: pd.DataFrame, method: str, metric: str) -> float | None:
     return None if mean is None else mean.value
 
 
-def shared_scenes(frame: pd.DataFrame, methods: Iterable[str], metric: str) -> list[str]:
+def match_scenes(frame: pd.DataFrame, methods: Iterable[str], metric: str) -> list[str]:
     """Return the scenes in which each of the methods has the metric with all of its seeds."""
     rows = frame[frame["usable"] & (frame["metric"] == metric)]
     scenes = list(dict.fromkeys(frame["scene"]))
@@ -187,7 +187,7 @@ def pair(frame: pd.DataFrame, one: str, other: str, metric: str) -> tuple[Mean |
     Where one of them was not measured at all, the other's mean is over its own scenes.
     """
     rows = frame[frame["method"].isin((one, other)) & ((frame["metric"] == metric) | ~frame["usable"])]
-    both = shared_scenes(rows, (one, other), metric)
+    both = match_scenes(rows, (one, other), metric)
     by_method = means(rows[rows["scene"].isin(both)] if both else rows, "method", "metric")
     first, second = (by_method.get((method, metric)) for method in (one, other))
     if first is None or second is None:
@@ -215,7 +215,7 @@ def error_of_twin(rows: pd.DataFrame, metric: str) -> pd.Series:
     )
 
 
-def in_spreads(run: Run, rows: pd.DataFrame, method: str, metric: str) -> float | None:
+def count_spreads(run: Run, rows: pd.DataFrame, method: str, metric: str) -> float | None:
     """Return how far a method is from the reference, in errors of its twin from another start.
 
     In each scene the spread is `error_of_twin`, and the method's error the root mean square over its
@@ -236,7 +236,7 @@ FRAME = ["scene", "seed", "seconds"]
 
 
 def share_of_frames(term: str) -> Metric:
-    """Declare the metric of the rows that `with_shares` adds."""
+    """Declare the metric of the rows that `add_shares` adds."""
     title = f"Frames with more {term}"
     return Metric(name=f"frames/{term}", unit="%", title=title, definition="", lower_is_better=True)
 
@@ -246,9 +246,7 @@ def half_of(mean: Mean) -> Mean:
     return replace(mean, value=HALF, cells=dict.fromkeys(mean.cells, HALF), seeded=False)
 
 
-def with_shares(
-    rows: pd.DataFrame, frames: pd.DataFrame, term: str, one: str, other: str
-) -> pd.DataFrame:
+def add_shares(rows: pd.DataFrame, frames: pd.DataFrame, term: str, one: str, other: str) -> pd.DataFrame:
     """Return the rows and, for either method, the share of frames in which it has more energy [%].
 
     Args:

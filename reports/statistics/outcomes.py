@@ -13,7 +13,7 @@ import pandas as pd
 
 from benchmarks.results.run_folder import RunFolder
 from reports.finished_run import Run, read_run
-from reports.statistics.paper_claims import in_words
+from reports.statistics.paper_claims import phrase
 from reports.statistics.pareto import NETWORK
 
 BAD = ("failed", "diverged", "timeout", "out-of-memory", "stalled")  # statuses, the worst first
@@ -47,7 +47,7 @@ def stress_tests(run: Run) -> pd.DataFrame:
     return rows[(rows["case"] != "") & (rows["status"] != "skipped")]
 
 
-def counted(run: Run) -> dict[str, Counter[str]]:
+def tally(run: Run) -> dict[str, Counter[str]]:
     """Count by status how the cells, checks and stress tests of the run ended."""
     cells = run.frame[(run.frame["case"] == "") & (run.frame["method"] != "")]
     # What has any usable number has run, whatever became of the others.
@@ -101,4 +101,4 @@ def published_verdicts() -> str:
     if not path.is_file():
         return ""
     table = pd.read_csv(path)
-    return in_words(Counter(table[table["family"] == "primary"]["verdict"].str.partition(":")[0]))
+    return phrase(Counter(table[table["family"] == "primary"]["verdict"].str.partition(":")[0]))

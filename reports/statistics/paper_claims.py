@@ -19,11 +19,11 @@ from reports.finished_run import Run
 from reports.statistics.effects import DIFFERENCE, RATIO, Effect, effect
 from reports.statistics.means_and_spreads import (
     HALF,
+    add_shares,
     half_of,
     pair,
     recording_of,
     share_of_frames,
-    with_shares,
 )
 from reports.statistics.verdicts import (
     LESS,
@@ -32,10 +32,10 @@ from reports.statistics.verdicts import (
     TIED,
     Comparison,
     compare_methods,
+    decide,
+    explain,
+    explain_untested,
     holm,
-    standing,
-    untested,
-    why_open,
 )
 
 HOLDS, FAILS = "holds", "does not hold"  # or TIED, or OPEN
@@ -206,12 +206,12 @@ class Judged:
     remark: str = ""
 
 
-def counts(lines: Iterable[Judged]) -> Counter[str]:
+def count(lines: Iterable[Judged]) -> Counter[str]:
     """Count the claims of the primary family, of these, by verdict."""
     return Counter(line.verdict for line in lines if line.claim.primary)
 
 
-def in_words(verdicts: Counter[str]) -> str:
+def phrase(verdicts: Counter[str]) -> str:
     """Return the counts as "3 hold, 1 is a tie"."""
     forms = {
         HOLDS: (HOLDS, "hold"), FAILS: (FAILS, "do not hold"),
@@ -220,13 +220,13 @@ def in_words(verdicts: Counter[str]) -> str:
     return ", ".join(f"{n} {forms[word][n != 1]}" for word in forms if (n := verdicts[word]))
 
 
-def judged(run: Run) -> list[Judged]:
+def judge_claims(run: Run) -> list[Judged]:
     """Judge all claims whose two methods ran, primary ones first."""
     rows = run.garment_rows
-    frame = with_before(rows[rows["garment"] == run.first_garment])
+    frame = add_cost(rows[rows["garment"] == run.first_garment])
     methods = set(frame["method"])
     claims = [claim for claim in CLAIMS if {claim.lower, claim.higher} <= methods]
-    compared = [_compared(run, frame, claim) for claim in claims]
+    compared = [_compare(run, frame, claim) for claim in claims]
     p_values = [
         comparison.effect.p_value(claim.factor) if comparison.effect else None
         for claim, comparison in zip(claims, compared)
@@ -240,7 +240,7 @@ def judged(run: Run) -> list[Judged]:
     for claim, comparison, p in zip(claims, compared, p_values):
         if comparison.effect is not None and comparison.one is not None and comparison.other is not None:
             outcome = verdict(claim, comparison.effect, p)
-            remark = why_open(comparison.effect, claim.factor) if outcome == OPEN else ""
+            remark = explain(comparison.effect, claim.factor) if outcome == OPEN else ""
             remark += comparison.one.fewer or comparison.other.fewer
         else:
             outcome, remark = verdict_of_failed(claim, comparison, frame)
@@ -249,11 +249,11 @@ def judged(run: Run) -> list[Judged]:
     return lines
 
 
-def _compared(run: Run, frame: pd.DataFrame, claim: Claim) -> Comparison:
+def _compare(run: Run, frame: pd.DataFrame, claim: Claim) -> Comparison:
     """Compare the two methods of a claim in its metric."""
     if claim.of_frames:  # the other's share is what is left, and no second sample
         metric = share_of_frames(claim.of_frames)
-        rows = with_shares(frame, run.frame_energies, claim.of_frames, claim.lower, claim.higher)
+        rows = add_shares(frame, run.frame_energies, claim.of_frames, claim.lower, claim.higher)
         rows = rows[(rows["metric"] == metric.name) | ~rows["usable"]]
         one, other = pair(rows, claim.lower, claim.higher, metric.name)
         if one is None or other is None:
@@ -278,11 +278,11 @@ def verdict(claim: Claim, effect: Effect, p: float | None) -> str:
     """
     if claim.factor != 1.0 and effect.scale != RATIO:
         return OPEN  # no factor between numbers of which some are zero
-    if claim.on_par and not untested(effect) and effect.ends is not None:
+    if claim.on_par and not explain_untested(effect) and effect.ends is not None:
         worst = effect.ends[1] + max((0.0, *effect.against.values()))
         if worst <= effect.margin:
             return HOLDS
-    outcome = standing(effect, p, claim.factor)
+    outcome = decide(effect, p, claim.factor)
     return {LESS: HOLDS, MORE: FAILS}.get(outcome, outcome)
 
 
@@ -313,7 +313,7 @@ def verdict_of_failed(claim: Claim, compared: Comparison, frame: pd.DataFrame) -
     return FAILS if side == "first" else HOLDS, f": the {side} diverged"
 
 
-def with_before(frame: pd.DataFrame) -> pd.DataFrame:
+def add_cost(frame: pd.DataFrame) -> pd.DataFrame:
     """Return the rows and the cost of each trained network before its first frame, where it is known."""
     rows = frame[frame["usable"] & frame["metric"].isin(BEFORE_FRAMES)]
     cell = ["scene", "method", "seed"]

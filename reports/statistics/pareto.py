@@ -54,7 +54,7 @@ def points_of(run: Run, frame: pd.DataFrame, scenes: Sequence[str], metric: str)
     rows = rows[rows["metric"].isin([metric, x, TIME, REPEATS]) | ~rows["usable"]]
     wide = means(rows, "method", "metric")
     points = []
-    for method in run.ordered(rows["method"]):
+    for method in run.order(rows["method"]):
         time, error, inference, repeats = (
             wide.get((method, name)) for name in (x, metric, TIME, REPEATS)
         )
@@ -88,7 +88,7 @@ def front(points: Iterable[Point]) -> list[Point]:
     return best
 
 
-def fastest(points: Iterable[Point], error: float) -> Point | None:
+def find_fastest(points: Iterable[Point], error: float) -> Point | None:
     """Return the fastest point with at most that error, or None."""
     reached = [p for p in points if p.error <= error]
     return min(reached, key=lambda p: (p.time, p.error, p.method)) if reached else None
@@ -100,7 +100,7 @@ def solvers(run: Run, points: Iterable[Point]) -> list[Point]:
     return [p for p in points if p.method in names and run.methods[p.method].family != SMALLER_STEPS]
 
 
-def indistinct(run: Run, rows: pd.DataFrame, metric: str) -> float:
+def noise_floor(run: Run, rows: pd.DataFrame, metric: str) -> float:
     """Return the error [unit of the metric] below which a method cannot be told from the reference.
 
     It is the error of the reference's twin from another start, the mean of scenes; of the energy gap what
@@ -116,14 +116,14 @@ def indistinct(run: Run, rows: pd.DataFrame, metric: str) -> float:
     return float(of_scene.mean()) if len(of_scene) else 0.0
 
 
-def compared_cells(run: Run) -> tuple[pd.DataFrame, list[str]]:
+def select_plot_cells(run: Run) -> tuple[pd.DataFrame, list[str]]:
     """Return the rows of plots of error against run time, and their scenes in order.
 
     Scenes of the first garment come first, among them those on which most methods were timed.
     """
     cells = run.cells("speed", "garments")
     timed = cells[cells["usable"] & (cells["metric"] == TIME)]
-    ablations = run.standing_apart(timed)
+    ablations = run.find_ablations(timed)
     frame = cells[~cells["method"].isin(ablations)]
     counts = timed[~timed["method"].isin(ablations)].groupby("scene")["method"].nunique()
     first = next(iter(run.garments(frame).values()), [])
@@ -150,12 +150,12 @@ def rivals(run: Run, timed: pd.DataFrame) -> list[str]:
     for metric in ACCURACIES:
         points = points_of(run, timed, list(dict.fromkeys(timed["scene"])), metric)
         network = next((p for p in points if p.method == NETWORK), None)
-        best = fastest(solvers(run, points), network.error) if network else None
+        best = find_fastest(solvers(run, points), network.error) if network else None
         names += [best.method] if best else []
     return list(dict.fromkeys(names))
 
 
-def timed_rows(run: Run, others: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
+def select_timed(run: Run, others: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
     """Return the rows of scenes of the first garment in which SNUG and solvers were timed.
 
     Their names come second. Of suite speed where it has any: whole motions have no energy gap.

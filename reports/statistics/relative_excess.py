@@ -25,8 +25,8 @@ from reports.statistics.effects import (
     Effect,
     effect,
     is_recorded,
-    off_scale,
-    on_scale,
+    rescale,
+    unscale,
 )
 from reports.statistics.means_and_spreads import Mean, mean_by_recording, pair
 
@@ -57,7 +57,7 @@ def relative_metric(metric: str) -> Metric:
     )  # fmt: skip
 
 
-def with_relative_excess(
+def add_excess(
     run: Run, rows: pd.DataFrame, metric: str = TOTAL, *, basis: pd.DataFrame | None = None
 ) -> pd.DataFrame:
     """Return the rows, and a row of the relative excess of each usable row of the metric.
@@ -151,11 +151,11 @@ class Excess:
     def typical_of(self, *, recorded: bool) -> float | None:
         """Return the typical value of recorded motions or of the others; None without any."""
         scaled = {
-            cell: float(on_scale(value, EXCESS)) for cell, value in self.cells.items()
+            cell: float(rescale(value, EXCESS)) for cell, value in self.cells.items()
             if is_recorded(cell[0]) == recorded
         }  # fmt: skip
         means = list(mean_by_recording(scaled).values())
-        return float(off_scale(float(np.mean(means)), EXCESS)) if means else None
+        return float(unscale(float(np.mean(means)), EXCESS)) if means else None
 
     @property
     def worst(self) -> tuple[str, float]:
@@ -165,7 +165,7 @@ class Excess:
 
 def excess_of(run: Run, rows: pd.DataFrame, method: str) -> Excess | None:
     """Return the relative excess of a method over the scenes of these rows; None where there is none."""
-    one, zero = compared_excess(run, rows, method, run.reference)
+    one, zero = pair_excesses(run, rows, method, run.reference)
     if one is None or zero is None:
         return None
     totals = _values(rows, TOTAL, [run.reference, SKINNING])
@@ -184,10 +184,10 @@ def own_excess_of(run: Run, rows: pd.DataFrame, method: str) -> Effect | None:
     return effect(one, zero, EXCESS) if one and zero else None
 
 
-def compared_excess(
+def pair_excesses(
     run: Run, rows: pd.DataFrame, one: str, other: str, metric: str = TOTAL
 ) -> tuple[Mean | None, Mean | None]:
     """Return the mean relative excesses of two methods over the scenes that both have."""
     relative = relative_metric(metric).name
     rows = rows[rows["metric"].isin([metric, TOTAL, relative]) | ~rows["usable"]]
-    return pair(with_relative_excess(run, rows, metric), one, other, relative)
+    return pair(add_excess(run, rows, metric), one, other, relative)

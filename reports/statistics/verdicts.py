@@ -25,7 +25,7 @@ from benchmarks.results.protocol import LEAST_MOTIONS, LEVEL
 from reports.finished_run import Run
 from reports.statistics.effects import DIFFERENCE, EXCESS, RANGE, Effect, cost_effect, effect
 from reports.statistics.means_and_spreads import Mean, pair
-from reports.statistics.relative_excess import compared_excess, relative_metric
+from reports.statistics.relative_excess import pair_excesses, relative_metric
 
 SIGNED = {"dynamics/correlation": DIFFERENCE}  # on this scale though a run may have positive values alone
 TIED, OPEN, LESS, MORE = "tie", "inconclusive", "less", "more"  # how the first stands to the second
@@ -50,7 +50,7 @@ def compare_methods(run: Run, rows: pd.DataFrame, metric: Metric, one: str, othe
     Energies whose zero is a choice are compared by their relative excess, costs by their range.
     """
     if metric.arbitrary_zero:
-        means = compared_excess(run, rows, one, other, metric.name)
+        means = pair_excesses(run, rows, one, other, metric.name)
     else:
         means = pair(rows[(rows["metric"] == metric.name) | ~rows["usable"]], one, other, metric.name)
     first, second = means
@@ -72,7 +72,7 @@ def effect_of(metric: Metric, one: Mean, other: Mean) -> Effect:
     return effect(one, other, EXCESS if metric.arbitrary_zero else SIGNED.get(metric.name, ""))
 
 
-def standing(effect: Effect, p: float | None, factor: float = 1.0) -> str:
+def decide(effect: Effect, p: float | None, factor: float = 1.0) -> str:
     """Return how `factor` times the first stands to the second: TIED, OPEN, LESS or MORE.
 
     Args:
@@ -80,27 +80,27 @@ def standing(effect: Effect, p: float | None, factor: float = 1.0) -> str:
         p: of effect.p_value(factor), corrected where the comparison is one of a family; None for costs.
         factor: see `Effect.p_value`.
 
-    >>> standing(Effect(0.5, "ratio", error=0.1, freedom=10.0, motions=20), p=0.001)
+    >>> decide(Effect(0.5, "ratio", error=0.1, freedom=10.0, motions=20), p=0.001)
     'more'
-    >>> standing(Effect(0.5, "ratio", error=0.1, freedom=10.0, motions=3), p=0.001)
+    >>> decide(Effect(0.5, "ratio", error=0.1, freedom=10.0, motions=3), p=0.001)
     'inconclusive'
     """
-    if untested(effect):
+    if explain_untested(effect):
         return OPEN
     if effect.covers == RANGE:
-        return _standing_of_range(effect, factor)
-    if effect.equal(factor):
+        return _decide_range(effect, factor)
+    if effect.is_equal(factor):
         return TIED
-    gap = effect.above(factor)
-    if p is None or p >= LEVEL or abs(gap) <= effect.uncertainty or effect.turned_by(factor):
+    gap = effect.gap(factor)
+    if p is None or p >= LEVEL or abs(gap) <= effect.uncertainty or effect.find_reversals(factor):
         return OPEN
     return LESS if gap < 0.0 else MORE
 
 
-def untested(effect: Effect) -> str:
+def explain_untested(effect: Effect) -> str:
     """Return why an effect has no verdict, as a remark behind it; empty where it has one.
 
-    >>> untested(Effect(0.5, "ratio", error=0.1, freedom=10.0, motions=3))
+    >>> explain_untested(Effect(0.5, "ratio", error=0.1, freedom=10.0, motions=3))
     ': fewer than 4 motions'
     """
     if effect.covers == RANGE:
@@ -110,18 +110,18 @@ def untested(effect: Effect) -> str:
     return f": fewer than {LEAST_MOTIONS} motions" if effect.motions < LEAST_MOTIONS else ""
 
 
-def why_open(effect: Effect, factor: float = 1.0) -> str:
+def explain(effect: Effect, factor: float = 1.0) -> str:
     """Return why an effect is inconclusive, as a remark behind it: untested, or turned by smaller steps.
 
-    >>> why_open(Effect(0.5, "ratio", error=0.1, motions=20, against={"simulation-dt/8": -0.6}))
+    >>> explain(Effect(0.5, "ratio", error=0.1, motions=20, against={"simulation-dt/8": -0.6}))
     ': other sign against simulation-dt/8'
     """
-    p, turned = effect.p_value(factor), ", ".join(effect.turned_by(factor))
-    clear = p is not None and p < LEVEL and abs(effect.above(factor)) > effect.uncertainty
-    return untested(effect) or (f": other sign against {turned}" if turned and clear else "")
+    p, turned = effect.p_value(factor), ", ".join(effect.find_reversals(factor))
+    clear = p is not None and p < LEVEL and abs(effect.gap(factor)) > effect.uncertainty
+    return explain_untested(effect) or (f": other sign against {turned}" if turned and clear else "")
 
 
-def _standing_of_range(effect: Effect, factor: float) -> str:
+def _decide_range(effect: Effect, factor: float) -> str:
     ends = [end + effect.shift(factor) for end in effect.limits or (effect.value,)]
     if all(abs(end) <= effect.margin for end in ends):
         return TIED

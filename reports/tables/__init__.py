@@ -13,8 +13,8 @@ from reports.tables.findings import (
     errors_in_spreads,
     extremes,
     findings,
+    list_unfinished,
     relative_excess,
-    unfinished,
     validation,
 )
 from reports.tables.page_one import overview
@@ -33,7 +33,7 @@ TABLES: tuple[Callable[[Run], list[Table]], ...] = (
     shapes,
     validation,
     extremes,
-    unfinished,
+    list_unfinished,
 )
 
 

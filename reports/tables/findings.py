@@ -10,20 +10,20 @@ import pandas as pd
 from benchmarks.metric import Metric
 from benchmarks.results.protocol import STARTS
 from reports.finished_run import Run
-from reports.statistics.effects import EXCESS, off_scale
-from reports.statistics.means_and_spreads import AT_REFERENCE, in_spreads
+from reports.statistics.effects import EXCESS, unscale
+from reports.statistics.means_and_spreads import AT_REFERENCE, count_spreads
 from reports.statistics.outcomes import check_name, checks, stress_tests, tolerances_away
-from reports.statistics.paper_claims import judged
+from reports.statistics.paper_claims import judge_claims
 from reports.statistics.relative_excess import (
     LEAST,
     SKINNING,
     Excess,
+    add_excess,
     excess_of,
     own_excess_of,
-    with_relative_excess,
 )
-from reports.statistics.verdicts import OPEN, measure_of, standing, why_open
-from reports.tables.table import GARMENT, METHOD, SCENE, SUITE, Cell, Column, Table, scene_in_words, table
+from reports.statistics.verdicts import OPEN, decide, explain, measure_of
+from reports.tables.table import GARMENT, METHOD, SCENE, SUITE, Cell, Column, Table, name_scene, table
 
 # The rule of verdicts (reports.statistics.verdicts) in a note.
 VERDICTS = (
@@ -60,7 +60,7 @@ def findings(run: Run) -> list[Table]:
             line.compared.one, line.compared.other, line.compared.effect, line.p,
             line.verdict + line.remark,
         )
-        for line in judged(run)
+        for line in judge_claims(run)
     ]  # fmt: skip
     caption = "Claims of the paper, and whether they hold here."
     return table("findings", columns, rows, caption, grouped_by=("claim",), note=CLAIMS_NOTE)
@@ -78,8 +78,8 @@ def relative_excess(run: Run) -> list[Table]:
     excesses: dict[tuple[str, str], Excess] = {}
     lines: list[tuple[Cell, ...]] = []
     for garment in run.garments(run.garment_rows):
-        rows = with_relative_excess(run, run.garment_rows[run.garment_rows["garment"] == garment])
-        for method in run.ordered(set(rows[rows["usable"]]["method"]) - zero):
+        rows = add_excess(run, run.garment_rows[run.garment_rows["garment"] == garment])
+        for method in run.order(set(rows[rows["usable"]]["method"]) - zero):
             if excess := excess_of(run, rows, method):
                 excesses[garment, method] = excess
                 lines.append((garment, method, own_excess_of(run, rows, method), *_cells_of(excess)))
@@ -96,16 +96,16 @@ def relative_excess(run: Run) -> list[Table]:
         "others: typical of the library's recordings, of other motions. Pooled: ratio of sums over motions."
     )
     means = table("relative_excess", columns, lines, caption, grouped_by=("garment",), note=EXCESS_NOTE)
-    return [*means, *_by_time_step(run, excesses)]
+    return [*means, *_tabulate_steps(run, excesses)]
 
 
-def _by_time_step(run: Run, excesses: Mapping[tuple[str, str], Excess]) -> list[Table]:
+def _tabulate_steps(run: Run, excesses: Mapping[tuple[str, str], Excess]) -> list[Table]:
     """Tabulate typical relative excesses by garment and method against each smaller time step."""
     members = [name for name in run.reference_family if name not in STARTS[1]]
     lines: list[tuple[Cell, ...]] = []
     for key, excess in excesses.items():
         value, against = excess.effect.value, excess.effect.against
-        moved = {name: float(off_scale(value + change, EXCESS)) for name, change in against.items()}
+        moved = {name: float(unscale(value + change, EXCESS)) for name, change in against.items()}
         if moved:
             lines.append((*key, excess.typical, *map(moved.get, members)))
     columns = (
@@ -122,11 +122,11 @@ def _by_time_step(run: Run, excesses: Mapping[tuple[str, str], Excess]) -> list[
 def _cells_of(excess: Excess) -> tuple[Cell, ...]:
     """Return the cells of a method in table relative_excess."""
     scene, value = excess.worst
-    verdict = standing(excess.effect, excess.effect.p_value())
-    verdict += why_open(excess.effect) if verdict == OPEN else ""
+    verdict = decide(excess.effect, excess.effect.p_value())
+    verdict += explain(excess.effect) if verdict == OPEN else ""
     return (
         excess.effect, excess.typical_of(recorded=True), excess.typical_of(recorded=False), excess.pooled,
-        value, scene_in_words(scene.partition("/")[2] or scene), len(excess.by_motion), verdict,
+        value, name_scene(scene.partition("/")[2] or scene), len(excess.by_motion), verdict,
     )  # fmt: skip
 
 
@@ -143,8 +143,8 @@ def errors_in_spreads(run: Run) -> list[Table]:
     lines: list[tuple[Cell, ...]] = []
     for garment in run.garments(run.garment_rows):
         rows = run.garment_rows[run.garment_rows["garment"] == garment]
-        for method in run.ordered(set(rows[rows["usable"]]["method"]) - variants):
-            values = [in_spreads(run, rows, method, metric.name) for metric in metrics]
+        for method in run.order(set(rows[rows["usable"]]["method"]) - variants):
+            values = [count_spreads(run, rows, method, metric.name) for metric in metrics]
             if any(value is not None for value in values):
                 lines.append((garment, method, *values))
     columns = (GARMENT, METHOD, *(Column(metric.name, _error_title(metric)) for metric in metrics))
@@ -212,7 +212,7 @@ def extremes(run: Run) -> list[Table]:
     return table("extremes", columns, lines, "Every stress test and how it ended.")
 
 
-def unfinished(run: Run) -> list[Table]:
+def list_unfinished(run: Run) -> list[Table]:
     """List every cell that failed or was skipped, once per reason, not per metric."""
     judged_elsewhere = (run.frame["case"] != "") & (run.frame["status"] != "skipped")
     rows = run.frame[(run.frame["status"] != "ok") & ~judged_elsewhere]

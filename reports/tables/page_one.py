@@ -7,9 +7,9 @@ from collections.abc import Sequence
 from reports.finished_run import Run
 from reports.statistics.means_and_spreads import mean_of
 from reports.statistics.outcomes import EXTERNAL, leads
-from reports.statistics.pareto import rivals, run_time, timed_rows
-from reports.statistics.relative_excess import SKINNING, excess_of, own_excess_of, with_relative_excess
-from reports.tables.table import METHOD, Cell, Column, Table, in_scenes, metric_column, table
+from reports.statistics.pareto import rivals, run_time, select_timed
+from reports.statistics.relative_excess import SKINNING, add_excess, excess_of, own_excess_of
+from reports.tables.table import METHOD, Cell, Column, Table, metric_column, say_where, table
 
 ROWS = 8
 ANSWERS = ("penetration/surface", "dynamics/correlation", "dynamics/amplitude")
@@ -26,22 +26,22 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     """
     garment = run.first_garment
     garment_rows = run.garment_rows[run.garment_rows["garment"] == garment]
-    timed, scenes = timed_rows(run, garment_rows)
+    timed, scenes = select_timed(run, garment_rows)
     garment_rows = timed if garment_rows.empty else garment_rows  # of a run of suite speed alone
-    plain = set(garment_rows[garment_rows["usable"]]["method"]) - run.standing_apart(garment_rows)
+    plain = set(garment_rows[garment_rows["usable"]]["method"]) - run.find_ablations(garment_rows)
     listed = leads(run, garment_rows)
-    others = [m for m in run.ordered(plain) if run.methods[m].role in ("network", EXTERNAL)]
-    others += [m for m in run.ordered(plain) if run.methods[m].role == "baseline"]
+    others = [m for m in run.order(plain) if run.methods[m].role in ("network", EXTERNAL)]
+    others += [m for m in run.order(plain) if run.methods[m].role == "baseline"]
     # Of a family of networks the last one: that of the highest level.
     last = {run.methods[m].family: m for m in others}
     listed += [m for m in last.values() if m not in listed]
     best = rivals(run, timed) if scenes else []
     solvers = [m for m in best if m not in listed]
-    listed = run.ordered(methods or [*listed[: ROWS - len(solvers)], *solvers])
+    listed = run.order(methods or [*listed[: ROWS - len(solvers)], *solvers])
     queries = [(name, garment_rows) for name in ANSWERS] + [(GAP, timed), (run_time(timed), timed)]
     queries += [("cost/train", garment_rows)]
     sources = [(run.metrics[name], rows) for name, rows in queries if name in run.metrics]
-    with_excess = with_relative_excess(run, garment_rows)
+    with_excess = add_excess(run, garment_rows)
     excesses = {name: excess_of(run, with_excess, name) for name in listed if name != run.reference}
     own_excess = {m: own_excess_of(run, garment_rows, m) for m in excesses if m != SKINNING}
     shares: dict[str, tuple[Cell, Cell]] = {
@@ -64,7 +64,7 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
         f"{garment}: means over independent sources of motion, of excess geometric. In own energies: over "
         "the minimum of what the network was trained on (a dash: of vertices, or without a minimum)"
     )
-    caption = of_motions if garment else f"Means {in_scenes(scenes)}"
-    caption += f"; run times (and energy gaps) {in_scenes(scenes)}." if garment and scenes else "."
-    tables = [made.filled() for made in table("overview", columns, lines, caption)]
+    caption = of_motions if garment else f"Means {say_where(scenes)}"
+    caption += f"; run times (and energy gaps) {say_where(scenes)}." if garment and scenes else "."
+    tables = [made.drop_empty() for made in table("overview", columns, lines, caption)]
     return [made for made in tables if made.columns != (METHOD,)]

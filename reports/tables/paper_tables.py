@@ -12,8 +12,8 @@ import numpy as np
 import pandas as pd
 
 from reports.finished_run import Run
-from reports.statistics.means_and_spreads import recording_of, shared_scenes
-from reports.tables.table import Cell, Column, Table, listed, table
+from reports.statistics.means_and_spreads import match_scenes, recording_of
+from reports.tables.table import Cell, Column, Table, join, table
 
 TEST_CLIPS = ("01_01", "07_02", "104_54", "55_27")
 # Energy -> of PBNS and of SNUG [J].
@@ -45,9 +45,9 @@ def _samples(run: Run, methods: Sequence[str], metric: str) -> Mapping[str, pd.S
         return {}
     rows = run.garment_rows[run.garment_rows["garment"] == run.first_garment]
     frames = run.frame_energies.groupby("scene")["seconds"].nunique()
-    frames = frames.reindex(shared_scenes(rows, methods, metric)).dropna()
+    frames = frames.reindex(match_scenes(rows, methods, metric)).dropna()
     clips = frames.index.map(lambda scene: recording_of(scene).partition("/")[2])
-    of_paper = listed([name for name in TEST_CLIPS if name in set(clips)])
+    of_paper = join([name for name in TEST_CLIPS if name in set(clips)])
     samples = {of_paper: frames[clips.isin(TEST_CLIPS)], f"all motions ({len(frames)})": frames}
     return {name: part for name, part in samples.items() if len(part)}
 

@@ -20,7 +20,7 @@ def metric_tables(run: Run, only: str = "") -> list[Table]:
     """
     declared = dict.fromkeys(metric.table for metric in run.metrics.values() if metric.table)
     names = [name for name in declared if only in ("", name)]
-    return [table for name in names for table in _by_garment(run, name) or _by_scene(run, name)]
+    return [table for name in names for table in _average_motions(run, name) or _average_seeds(run, name)]
 
 
 PAPER_COSTS = (
@@ -29,7 +29,7 @@ PAPER_COSTS = (
 )
 
 
-def _by_garment(run: Run, name: str) -> list[Table]:
+def _average_motions(run: Run, name: str) -> list[Table]:
     """Tabulate means over the sources of motion of each garment.
 
     Ablations, which stand beside their base, and perturbed references are left out; one of the latter is
@@ -40,7 +40,7 @@ def _by_garment(run: Run, name: str) -> list[Table]:
     metrics, lines = pivot(run, run.garment_rows, name, ("garment", "method"))
     twins = run.twins - (set(SECOND_STARTS[:1]) if name == "curvature" else set())
     omissions = {
-        garment: run.standing_apart(rows) | twins
+        garment: run.find_ablations(rows) | twins
         for garment, rows in run.garment_rows[run.garment_rows["table"] == name].groupby("garment")
     }
     return table(
@@ -51,7 +51,7 @@ def _by_garment(run: Run, name: str) -> list[Table]:
     )  # fmt: skip
 
 
-def _by_scene(run: Run, name: str) -> list[Table]:
+def _average_seeds(run: Run, name: str) -> list[Table]:
     """Tabulate means over seeds in each scene."""
     metrics, lines = pivot(run, run.cells(), name, ("suite", "scene", "method"))
     columns = (SUITE, SCENE, METHOD, *map(metric_column, metrics))
@@ -75,7 +75,7 @@ def pivot(
     cells = means(frame[frame["metric"].isin(usable) | ~frame["usable"]], *keys, "metric")
     wide = cells.unstack("metric", sort=False).astype(object)
     wide = wide.where(wide.notna(), None)[[metric.name for metric in metrics]]
-    methods = {method: k for k, method in enumerate(run.ordered(wide.index.get_level_values(-1)))}
+    methods = {method: k for k, method in enumerate(run.order(wide.index.get_level_values(-1)))}
     garments = {garment: k for k, garment in enumerate(run.garments(table_rows))}
     outer = {key[:-1]: k for k, key in reversed(list(enumerate(wide.index)))}
     last = len(keys) - 1
@@ -100,7 +100,7 @@ def ablation_effects(run: Run) -> list[Table]:
     lines: list[tuple[Cell, ...]] = []
     for garment in run.garments(run.garment_rows):
         rows = run.garment_rows[run.garment_rows["garment"] == garment]
-        for method in run.ordered(run.standing_apart(rows) & set(rows[rows["usable"]]["method"])):
+        for method in run.order(run.find_ablations(rows) & set(rows[rows["usable"]]["method"])):
             base = run.methods[method].base
             effects = [compare_methods(run, rows, metric, method, base).effect for metric in metrics]
             lines.append((garment, method, *effects))
@@ -129,7 +129,7 @@ def shapes(run: Run) -> list[Table]:
     metrics = [run.metrics[name] for name in METRICS if name in run.metrics]
     if norms.nunique() < 2 or not metrics:
         return []
-    methods = run.ordered(set(rows["method"]) - run.twins)
+    methods = run.order(set(rows["method"]) - run.twins)
     lines: list[tuple[Cell, ...]] = []
     for name, scenes in ((OTHERS, norms.index[norms > 0.0]), (MEAN_BODY, norms.index[norms == 0.0])):
         part = rows[rows["scene"].isin(scenes)]

@@ -38,20 +38,20 @@ def number(value: float | None, digits: int = 3, *, trim: bool = False) -> str:
     exponent = math.floor(math.log10(abs(float(f"{value:.{digits - 1}e}"))))
     if -4 <= exponent < 6:
         text = f"{value:,.{max(digits - 1 - exponent, 0)}f}".replace("-", "−")
-        return _trimmed(text) if trim else text
+        return _trim(text) if trim else text
     mantissa, _, power = f"{value:.{digits - 1}e}".partition("e")
-    mantissa = _trimmed(mantissa) if trim else mantissa
+    mantissa = _trim(mantissa) if trim else mantissa
     return f"{mantissa.replace('-', '−')}×10{str(int(power)).translate(_RAISED)}"
 
 
-def _trimmed(text: str) -> str:
+def _trim(text: str) -> str:
     return text.rstrip("0").rstrip(".") if "." in text else text
 
 
-def with_spread(value: float | None, spread: float | None) -> str:
+def format_spread(value: float | None, spread: float | None) -> str:
     """Return a number with its spread to two digits, without ± where there is no spread.
 
-    >>> with_spread(0.5, 0.0123)
+    >>> format_spread(0.5, 0.0123)
     '0.500 ± 0.012'
     """
     if spread is None or not math.isfinite(spread) or number(value) == DASH:
@@ -82,16 +82,16 @@ def csv_number(value: float | None) -> str:
     return f"{value:.9g}"
 
 
-def in_scenes(scenes: Collection[str]) -> str:
+def say_where(scenes: Collection[str]) -> str:
     """Return "in 1 scene", "in 2 scenes" or, of liveliest parts alone, "in 2 clips"."""
     kind = "clip" if all(name.endswith("@clip") for name in scenes) else "scene"
     return f"in {len(scenes)} {kind}{'' if len(scenes) == 1 else 's'}"
 
 
-def scene_in_words(scene: str) -> str:
+def name_scene(scene: str) -> str:
     """Return a scene by its garment, what a recorded motion shows, and the motion.
 
-    >>> scene_in_words("tshirt/07_02@clip"), scene_in_words("push_recovery")
+    >>> name_scene("tshirt/07_02@clip"), name_scene("push_recovery")
     ('tshirt: walk, 1.5 m/s, 07_02, clip', 'push recovery')
     """
     garment, _, motion = scene.rpartition("/")
@@ -101,10 +101,10 @@ def scene_in_words(scene: str) -> str:
     return f"{garment}: " * bool(garment) + ", ".join(filter(None, (*motions, part)))
 
 
-def listed(items: Sequence[str]) -> str:
+def join(items: Sequence[str]) -> str:
     """Return the words as "a, b and c".
 
-    >>> listed(["a", "b", "c"]), listed(["a"]), listed([])
+    >>> join(["a", "b", "c"]), join(["a"]), join([])
     ('a, b and c', 'a', '')
     """
     return " and ".join(filter(None, [", ".join(items[:-1]), *items[-1:]]))
@@ -159,7 +159,7 @@ class Table:
     grouped_by: tuple[str, ...] = ()
     note: str = ""
 
-    def filled(self) -> Table:
+    def drop_empty(self) -> Table:
         """Return the table without the columns in which no row has a cell."""
         places = [k for k, cells in enumerate(zip(*self.rows)) if any(c is not None for c in cells)]
         rows = tuple(tuple(row[k] for k in places) for row in self.rows)

@@ -19,8 +19,8 @@ from reference_sim.files.atomic_files import replacing
 from reports.finished_run import Run
 from reports.statistics.effects import RANGE, Effect
 from reports.statistics.means_and_spreads import pair, recording_of
-from reports.statistics.pareto import run_time, timed_rows
-from reports.statistics.relative_excess import TOTAL, excess_of, own_excess_of, with_relative_excess
+from reports.statistics.pareto import run_time, select_timed
+from reports.statistics.relative_excess import TOTAL, add_excess, excess_of, own_excess_of
 from reports.statistics.verdicts import effect_of
 from reports.tables.table import DASH, METHOD, Cell, Column, Table, column_texts, metric_column
 
@@ -47,14 +47,14 @@ def paper_table(run: Run) -> Table:
     """Return the methods on the first garment, or in all scenes, with columns that the run has."""
     rows = run.garment_rows[run.garment_rows["garment"] == run.first_garment]
     rows = run.cells() if rows.empty else rows
-    omissions = {"", *run.standing_apart(rows), *run.twins, *run.with_role("reference-variant")}
+    omissions = {"", *run.find_ablations(rows), *run.twins, *run.with_role("reference-variant")}
     rows = rows[~rows["method"].isin(omissions)]
-    usable, excesses = rows[rows["usable"]], with_relative_excess(run, rows)
-    timed, _ = timed_rows(run, rows)
+    usable, excesses = rows[rows["usable"]], add_excess(run, rows)
+    timed, _ = select_timed(run, rows)
     queries = [(name, rows) for name in METRICS] + [(run_time(timed), timed)]
     sources = [(run.metrics[n], part) for n, part in queries if n in set(part[part["usable"]]["metric"])]
     lines: list[tuple[Cell, ...]] = []
-    for method in run.ordered(usable["method"]):
+    for method in run.order(usable["method"]):
         of_method = usable[(usable["method"] == method) & usable["metric"].isin((TOTAL, *METRICS))]
         common = excess_of(run, excesses, method) if method != run.reference else None
         effects = [own_excess_of(run, rows, method), common.effect if common else None]
@@ -75,7 +75,7 @@ def paper_table(run: Run) -> Table:
         f"Protocol {run.protocol or 'own'}; cite: {CITATION}, at {run.config.get('commit') or 'no commit'}."
     )
     rounded = tuple(replace(column, digits=2) for column in columns)
-    return Table(NAME, rounded, tuple(lines), caption).filled()
+    return Table(NAME, rounded, tuple(lines), caption).drop_empty()
 
 
 def _mean(rows: pd.DataFrame, method: str, metric: Metric) -> Effect | None:
@@ -100,10 +100,10 @@ def latex_table(run: Run, table: Table) -> str:
     """Return a table as a float of LaTeX, an interval below its number."""
     columns = [column_texts(run, column, cells) for column, cells in zip(table.columns, zip(*table.rows))]
     heads = [
-        _stacked(*column.title.replace(", ", " ").split(), f"[{column.unit}]" * bool(column.unit))
+        _stack(*column.title.replace(", ", " ").split(), f"[{column.unit}]" * bool(column.unit))
         for column in table.columns
     ]
-    body = [[_stacked(cell["text"].removeprefix("+"), cell["spread"].replace(" to ", DASH)) for cell in line]
+    body = [[_stack(cell["text"].removeprefix("+"), cell["spread"].replace(" to ", DASH)) for cell in line]
         for line in zip(*columns)]  # fmt: skip
     lines = [f"\\raggedright {' & '.join(line)} \\\\[4pt]" for line in (heads, *body)]
     sides = "".join("p{2.7cm}" if column.text else "r" for column in table.columns)
@@ -115,7 +115,7 @@ def latex_table(run: Run, table: Table) -> str:
     ])  # fmt: skip
 
 
-def _stacked(*texts: str) -> str:
+def _stack(*texts: str) -> str:
     """Return the texts below each other in one cell."""
     lines = r"\\".join(latex(text) for text in texts if text)
     return f"\\shortstack{{{lines}}}" if r"\\" in lines else lines

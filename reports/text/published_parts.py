@@ -27,7 +27,7 @@ from functools import cache
 from importlib import import_module
 from pathlib import Path
 
-from benchmarks.metrics import declared
+from benchmarks.metrics import list_metrics
 from benchmarks.presets import PRESETS
 from benchmarks.results.run_folder import RunFolder
 from reports.finished_run import Run
@@ -35,9 +35,9 @@ from reports.sentences import verdict
 from reports.statistics.effects import RATIO
 from reports.statistics.means_and_spreads import mean_of
 from reports.statistics.outcomes import PUBLISHED, read_published
-from reports.statistics.paper_claims import EXPLORATORY, PRIMARY, UNSEEN, Claim, Judged, judged
-from reports.statistics.pareto import NETWORK, WHOLE, timed_rows
-from reports.statistics.relative_excess import excess_of, with_relative_excess
+from reports.statistics.paper_claims import EXPLORATORY, PRIMARY, UNSEEN, Claim, Judged, judge_claims
+from reports.statistics.pareto import NETWORK, WHOLE, select_timed
+from reports.statistics.relative_excess import add_excess, excess_of
 from reports.statistics.verdicts import measure_of
 from reports.tables import make_tables
 from reports.tables.page_one import overview
@@ -62,11 +62,11 @@ def published_part(request: str) -> str:
     """
     subject, _, source = request.partition(" of ")
     names, *lists = source.split(";")
-    columns, methods = (_words(text) for text in (*lists, "", "")[:2])
-    folders = [PUBLISHED / name for name in _words(names)]
+    columns, methods = (_split(text) for text in (*lists, "", "")[:2])
+    folders = [PUBLISHED / name for name in _split(names)]
     kind, _, name = subject.partition(" ")
     if (part := request.partition(";")[0]) in PARTS:
-        return markdown_table(chosen_rows(PARTS[part](), columns))
+        return markdown_table(choose_rows(PARTS[part](), columns))
     if subject == "table overview" and methods:
         return markdown_table(_overview(folders, columns, methods))
     forms: dict[str, Callable[[], str | Rows]] = {
@@ -75,7 +75,7 @@ def published_part(request: str) -> str:
         "table": lambda: _table(folders[0], name, columns, methods),
         "claims": lambda: claim_rows(name, folders),
         "runs": lambda: run_rows(folders),
-        "times": lambda: time_rows([(read_published(f), _made(f, "cost")) for f in folders], columns),
+        "times": lambda: time_rows([(read_published(f), _look_up(f, "cost")) for f in folders], columns),
     }
     if kind not in forms:
         raise ValueError(f"no part is generated from '{request}'; known: {', '.join((*forms, *PARTS))}")
@@ -83,18 +83,18 @@ def published_part(request: str) -> str:
     return content if isinstance(content, str) else markdown_table(content)
 
 
-def _words(text: str) -> list[str]:
+def _split(text: str) -> list[str]:
     return [word.strip() for word in text.split(",") if word.strip()]
 
 
 @cache
-def _judged(*folders: Path) -> tuple[dict[Claim, tuple[str, Judged]], dict[str, str]]:
+def _judge_runs(*folders: Path) -> tuple[dict[Claim, tuple[str, Judged]], dict[str, str]]:
     """Return claim -> first run that has both of its methods and its judgement; labels of methods."""
     verdicts: dict[Claim, tuple[str, Judged]] = {}
     labels: dict[str, str] = {}
     for folder in folders:
         run = read_published(folder)
-        for line in judged(run):
+        for line in judge_claims(run):
             if folder.name in TIMED or line.compared.metric.unit not in TIMES:
                 verdicts.setdefault(line.claim, (folder.name, line))
         labels = {method: run.label(method) for method in run.methods} | labels
@@ -103,7 +103,7 @@ def _judged(*folders: Path) -> tuple[dict[Claim, tuple[str, Judged]], dict[str, 
 
 def claim_rows(family: str, folders: Sequence[Path]) -> Rows:
     """Return a heading and a row of each test of a family that these runs judge; each claim once."""
-    verdicts, labels = _judged(*folders)
+    verdicts, labels = _judge_runs(*folders)
     left_out = slice(4, 4 if family == "primary" else 5)  # others are shown without p
     rows = [["Claim", "Tested", "Effect", "Interval", "p", "Verdict"]]
     before = ""
@@ -135,10 +135,10 @@ def front_sentences(run: Run) -> str:
         KeyError: the method or claim of which a number is missing.
     """
     frame = run.garment_rows
-    rows, (timed, _) = with_relative_excess(run, frame), timed_rows(run, frame)
+    rows, (timed, _) = add_excess(run, frame), select_timed(run, frame)
     names = (NETWORK, "supervised", "pbns", SOLVER)
     excesses = {name: excess for name in names if (excess := excess_of(run, rows, name))}
-    p_values = {line.claim.says: line.p for line in judged(run) if line.p is not None}
+    p_values = {line.claim.says: line.p for line in judge_claims(run) if line.p is not None}
     likeness, swing, times = (
         {name: mean.value for name in names if (mean := mean_of(part, name, metric))}
         for part, metric in ((frame, ALIKE), (frame, SWING), (timed, WHOLE))
@@ -179,13 +179,13 @@ def _overview(folders: Sequence[Path], columns: Sequence[str], methods: Sequence
     for run in map(read_published, folders):
         missing = [name for name in methods if name in run.methods and name not in rows]
         heads, *lines = text_rows(run, overview(run, missing)[0], columns)
-        rows |= dict(zip(run.ordered(missing), lines))
+        rows |= dict(zip(run.order(missing), lines))
     return [heads, *(rows[name] for name in methods)]
 
 
 def _table(folder: Path, name: str, columns: Sequence[str], methods: Sequence[str]) -> str:
     """Return a table of a run: these columns and methods, all where none is named; what its marks mean."""
-    run, table = read_published(folder), _made(folder, name)
+    run, table = read_published(folder), _look_up(folder, name)
     place = next((k for k, column in enumerate(table.columns) if column.method), 0)
     lines = [row for row in table.rows if not methods or row[place] in methods]
     if rest := set(methods) - {str(row[place]) for row in lines}:
@@ -199,16 +199,16 @@ def _tables(folder: Path) -> dict[str, Table]:
     return make_tables(read_published(folder))
 
 
-def _made(folder: Path, name: str) -> Table:
+def _look_up(folder: Path, name: str) -> Table:
     if name not in _tables(folder):
         raise KeyError(f"table {name} of {folder.name}")
     return _tables(folder)[name]
 
 
-def chosen_rows(rows: Rows, names: Sequence[str]) -> Rows:
+def choose_rows(rows: Rows, names: Sequence[str]) -> Rows:
     """Return the heading and the rows whose first cells have these names, in their order; all without names.
 
-    >>> chosen_rows([("Field", "Content"), ("`dt`", "[s]"), ("`frames`", "number")], ["frames"])
+    >>> choose_rows([("Field", "Content"), ("`dt`", "[s]"), ("`frames`", "number")], ["frames"])
     [('Field', 'Content'), ('`frames`', 'number')]
     """
     row_of_name = {name: row for row in rows[1:] for name in re.findall(r"[\w/-]+", row[0])}
@@ -229,7 +229,7 @@ def docstring_rows(module: str) -> Rows:
 
 def metric_rows() -> Rows:
     """Return a heading and a row of each declared metric: name, unit, definition."""
-    rows = ((f"`{metric.name}`", metric.unit, metric.definition) for metric in declared().values())
+    rows = ((f"`{metric.name}`", metric.unit, metric.definition) for metric in list_metrics().values())
     return [("Metric", "Unit", "Definition"), *rows]
 
 

@@ -74,7 +74,7 @@ class Body:
         """Number S of shape coefficients."""
         return self.shape_directions.shape[-1]
 
-    def shaped(self, betas: ArrayLike | None = None) -> NDArray[np.float64]:
+    def rest_vertices(self, betas: ArrayLike | None = None) -> NDArray[np.float64]:
         """Return the vertices (B, 3) [m] of the unposed body of shape `betas` (S,), by default the mean.
 
         Raises:
@@ -82,13 +82,13 @@ class Body:
         """
         if betas is None:
             return self.template.copy()
-        return self.template + self.shape_directions @ self._checked(betas)
+        return self.template + self.shape_directions @ self._check(betas)
 
     def joints(self, betas: ArrayLike | None = None) -> NDArray[np.float64]:
         """Return the joints (24, 3) [m] of the unposed body of shape `betas` (S,). Raises BodyError."""
         if betas is None:
             return self.joint_template.copy()
-        return self.joint_template + self.joint_directions @ self._checked(betas)
+        return self.joint_template + self.joint_directions @ self._check(betas)
 
     def vertices(
         self, poses: ArrayLike, translations: ArrayLike, betas: ArrayLike | None = None
@@ -120,7 +120,7 @@ class Body:
 
         # sum_j w_ij T_j (p_i, 1) is one product: (w_ij p_ik) over (j, k), mostly zero, times T over (j,
         # k).
-        points = np.concatenate([self.shaped(betas), np.ones((len(self.template), 1))], axis=1)
+        points = np.concatenate([self.rest_vertices(betas), np.ones((len(self.template), 1))], axis=1)
         spread = csr_array(
             (self.skinning_weights[:, :, None] * points[:, None, :]).reshape(len(points), -1)
         )
@@ -128,7 +128,7 @@ class Body:
         def pose(poses: ArrayLike, translations: ArrayLike) -> NDArray[np.float64]:
             transforms = self.transforms(poses, translations, betas)
             if self.pose_directions is not None:
-                return self._corrected(points[:, :3], np.asarray(poses, dtype=float), transforms)
+                return self._pose_corrected(points[:, :3], np.asarray(poses, dtype=float), transforms)
             posed = np.empty((len(transforms), len(points), 3))
             for start in range(0, len(transforms), _CHUNK):
                 part = transforms[start : start + _CHUNK]
@@ -139,7 +139,7 @@ class Body:
 
         return pose
 
-    def _corrected(
+    def _pose_corrected(
         self, shaped: NDArray[np.float64], poses: NDArray[np.float64], transforms: NDArray[np.float64]
     ) -> NDArray[np.float64]:
         """Return posed vertices (T, B, 3) [m] with the pose correctives of each frame."""
@@ -174,7 +174,7 @@ class Body:
         """Height of the template [m]."""
         return float(np.ptp(self.template[:, 1]))
 
-    def _checked(self, betas: ArrayLike) -> NDArray[np.float64]:
+    def _check(self, betas: ArrayLike) -> NDArray[np.float64]:
         betas = np.asarray(betas, dtype=float)
         if betas.shape != (self.shape_count,) or not np.isfinite(betas).all():
             raise BodyError(f"betas of shape {betas.shape}: expected {self.shape_count} finite numbers")

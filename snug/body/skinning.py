@@ -62,17 +62,17 @@ def skin(points: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
     tensor([[0., 1., 0.],
             [0., 1., 0.]])
     """
-    blended = _blended(weights, transforms)
+    blended = _blend(weights, transforms)
     # Row by row: that many products of a matrix and a vector take a GPU several times as long.
     return (blended[..., :3] * points[..., None, :]).sum(-1) + blended[..., 3]
 
 
 def unskin(posed: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
     """Invert `skin`: return the points (..., V, 3) [m] of the rest pose that it takes to `posed`."""
-    blended = _blended(weights, transforms)
+    blended = _blend(weights, transforms)
     return torch.linalg.solve(blended[..., :3], (posed - blended[..., 3])[..., None])[..., 0]
 
 
-def _blended(weights: Tensor, transforms: Tensor) -> Tensor:
+def _blend(weights: Tensor, transforms: Tensor) -> Tensor:
     """Return the blended transform (..., V, 3, 4) of each vertex."""
     return (weights @ transforms.flatten(-2)).unflatten(-1, (3, 4))

@@ -47,7 +47,7 @@ class CutPlane:
         offset = points - self.point
         return offset @ np.asarray(self.normal) + self.bend * _saturated_square(offset[:, 2])
 
-    def beyond(self, points: Array) -> Array:
+    def depth(self, points: Array) -> Array:
         """Return how far (N,) [m] points (N,3) are on the side that is cut away, to first order."""
         return np.minimum(
             self.height(points) / np.linalg.norm(self._slope(points), axis=1),
@@ -108,7 +108,7 @@ def armhole_cut(
     under = arm[arm[:, 0] < shoulder[0] + ARMPIT_ROOM, 1].min(initial=shoulder[1]) - ARMPIT_ROOM
     shirt = skin[skin_following(body, SHIRT_BONES)]
     collar = skin[skin_following(body, (*SHIRT_BONES, "neck"))]
-    edge = strap + clearance + collar[neck.beyond(collar) > -clearance, 0].max(initial=0.0)
+    edge = strap + clearance + collar[neck.depth(collar) > -clearance, 0].max(initial=0.0)
     over = shirt[np.abs(shirt[:, 0] - edge) < ARMPIT_ROOM]
     top = over[:, 1].max(initial=shoulder[1]) + clearance
     flank = skin[skin_following(body, TORSO_BONES) & (skin[:, 1] > hem) & (skin[:, 1] < under)]
@@ -132,11 +132,11 @@ def cut_sheet(surface: ImplicitSurface, cuts: list[CutPlane]) -> tuple[Array, In
     grid["field"] = surface.values.ravel(order="F")
     sheet = grid.contour([0.0], scalars="field")
     for cut in cuts:
-        sheet["cut"] = cut.beyond(np.asarray(sheet.points, dtype=np.float64))
+        sheet["cut"] = cut.depth(np.asarray(sheet.points, dtype=np.float64))
         sheet = sheet.clip_scalar(scalars="cut", value=0.0)
         # Clipping interpolates linearly along edges: onto a bent cut by one Newton step.
         points = np.asarray(sheet.points, dtype=np.float64)
-        off = cut.beyond(points)
+        off = cut.depth(points)
         rim = np.abs(off) < 2e-4
         points[rim] -= off[rim, None] * cut.normals(points[rim])
         sheet.points = points
@@ -157,7 +157,7 @@ def outlines(points: Array, faces: Index, cuts: list[CutPlane]) -> list[list[tup
     """
     loops = []
     for loop in boundary_loops(faces):
-        distance = np.abs(np.stack([cut.beyond(points[loop]) for cut in cuts]))
+        distance = np.abs(np.stack([cut.depth(points[loop]) for cut in cuts]))
         hits = distance < 1e-5
         corners = np.flatnonzero(hits.sum(axis=0) > 1)
         if len(corners) == 0:

@@ -99,7 +99,7 @@ class Garment:
         """
         if betas is None:
             return self.rest_positions.copy()
-        displacement = (body.shaped(betas) - body.template)[self.body_vertices]
+        displacement = (body.rest_vertices(betas) - body.template)[self.body_vertices]
         return self.rest_positions + smooth_weights(displacement, self.faces, SHAPE_SMOOTHING)
 
 

@@ -248,7 +248,7 @@ def _keep_off(body: Body, points: Array, faces: Index, cuts: list[CutPlane], cle
         # A vertex of several such faces follows the worst one: the last to be written.
         push[faces[short].ravel()] = np.repeat(1.3 * (lack[short, None] + 1e-5) * away[short], 3, axis=0)
         for cut in cuts:
-            on = np.abs(cut.beyond(points)) < 1e-6
+            on = np.abs(cut.depth(points)) < 1e-6
             normal = cut.normals(points[on])
             # Along the cut, and longer: the distance must still grow by what is lacking.
             slanted = push[on] - np.sum(push[on] * normal, axis=1, keepdims=True) * normal

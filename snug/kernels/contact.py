@@ -13,7 +13,7 @@ import numpy as np
 from reference_sim.geometry.leaf_bounds import closest_on_triangle
 from reference_sim.kernels.fast_kernels import TRAINING_LANES
 from reference_sim.kernels.kernel_cache import njit
-from reference_sim.kernels.lanes import add_lanes, copy_lanes, mixed_rows
+from reference_sim.kernels.lanes import add_lanes, copy_lanes, mix_rows
 
 WALK_SLACK = 0.001  # m: beyond the margin, and still followed
 CROSSINGS = 12  # sides that an anchor may cross at a time: some 15 cm
@@ -133,7 +133,7 @@ def byte_normals(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True, inline="always", error_model="numpy")
-def _above(
+def _height(
     x0: np.float32,
     x1: np.float32,
     x2: np.float32,
@@ -145,14 +145,14 @@ def _above(
 ) -> tuple[np.float32, np.float32, np.float32, np.float32]:
     """Height of a sample above its anchor's plane, times the length of the normal; and that normal.
 
-    skin, m: positions and normals of the body, flat as `mixed_rows` wants them.
+    skin, m: positions and normals of the body, flat as `mix_rows` wants them.
     """
     i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
     whole = np.float32(1.0) / np.float32(PARTS)
     v, w = whole * np.float32(parts[0]), whole * np.float32(parts[1])
     u = np.float32(1.0) - v - w
-    c0, c1, c2 = mixed_rows(skin, i, j, k, u, v, w)
-    n0, n1, n2 = mixed_rows(m, i, j, k, u, v, w)
+    c0, c1, c2 = mix_rows(skin, i, j, k, u, v, w)
+    n0, n1, n2 = mix_rows(m, i, j, k, u, v, w)
     return n0 * (x0 - c0) + n1 * (x1 - c1) + n2 * (x2 - c2), n0, n1, n2
 
 
@@ -193,8 +193,8 @@ def contact_energy(
             face = np.uint32(anchors[s])
             a, b, c = stencils[s, 0], stencils[s, 1], stencils[s, 2]
             p, q, r = weights[s, 0], weights[s, 1], weights[s, 2]
-            x0, x1, x2 = mixed_rows(garment, a, b, c, p, q, r)
-            along, n0, n1, n2 = _above(x0, x1, x2, skin, m, faces, face, parts[s])
+            x0, x1, x2 = mix_rows(garment, a, b, c, p, q, r)
+            along, n0, n1, n2 = _height(x0, x1, x2, skin, m, faces, face, parts[s])
             if along >= reach:
                 continue
             if walk and along < reach:  # not a sample that is no number
@@ -205,7 +205,7 @@ def contact_energy(
                 parts[s, 0] = np.uint8(np.rint(np.float32(PARTS) * v))
                 third = np.rint(np.float32(PARTS) * w)
                 parts[s, 1] = np.uint8(min(third, np.float32(PARTS) - np.float32(parts[s, 0])))
-                along, n0, n1, n2 = _above(x0, x1, x2, skin, m, faces, np.uint32(anchors[s]), parts[s])
+                along, n0, n1, n2 = _height(x0, x1, x2, skin, m, faces, np.uint32(anchors[s]), parts[s])
             length = np.sqrt(n0 * n0 + n1 * n1 + n2 * n2) + np.float32(1e-30)
             depth = margin - along / length
             if depth <= zero:

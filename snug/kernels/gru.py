@@ -69,12 +69,12 @@ class FastGRU(torch.autograd.Function):
             w_i, w_h, b_i, b_h = weights[4 * layer : 4 * layer + 4]
             (frames, count), size = x.shape[:2], w_h.shape[1]
             wide = size + -size % TRAINING_LANES
-            inputs = _widened(product(x.flatten(0, 1), w_i, b_i), size).view(frames, count, -1)
+            inputs = _widen(product(x.flatten(0, 1), w_i, b_i), size).view(frames, count, -1)
             hidden = x.new_zeros(frames + 1, count, wide)
             gates = x.new_empty(frames, count, 4 * wide)  # r, z, n, q
             hidden[0, :, :size] = start
             for t in range(frames):
-                recurrent = _widened(product(hidden[t, :, :size].contiguous(), w_h, b_h), size)
+                recurrent = _widen(product(hidden[t, :, :size].contiguous(), w_h, b_h), size)
                 arrays = inputs[t], recurrent, hidden[t], gates[t], hidden[t + 1]
                 _cell(*(array.numpy().ravel() for array in arrays), wide // TRAINING_LANES)
             saved += [x, gates, hidden]
@@ -95,7 +95,7 @@ class FastGRU(torch.autograd.Function):
         for layer in reversed(range(ctx.layers)):
             w_i, w_h = weights[4 * layer : 4 * layer + 2]
             x, gates, hidden = saved[3 * layer : 3 * layer + 3]
-            to_inputs, to_recurrent = _back_in_time(y, gates, hidden, w_h)
+            to_inputs, to_recurrent = _backpropagate(y, gates, hidden, w_h)
             before = hidden[:-1, :, : w_h.shape[1]].contiguous().flatten(0, 1)
             gradients[4 * layer : 4 * layer + 4] = [
                 product(to_inputs.t(), x.flatten(0, 1).t()),
@@ -108,28 +108,28 @@ class FastGRU(torch.autograd.Function):
         return None, None, *gradients
 
 
-def _back_in_time(y: Tensor, gates: Tensor, hidden: Tensor, w_h: Tensor) -> tuple[Tensor, Tensor]:
+def _backpropagate(y: Tensor, gates: Tensor, hidden: Tensor, w_h: Tensor) -> tuple[Tensor, Tensor]:
     """Return the gradients (T N, 3H) by W_i x and by W_h h, from those y (T, N, H) by a layer's outputs."""
     (frames, count, size), wide = y.shape, hidden.shape[-1]
     to_inputs, to_recurrent = (y.new_empty(frames, count, 3 * wide) for _ in range(2))
-    back, y = y.new_zeros(count, wide), _widened(y.contiguous(), size)
+    back, y = y.new_zeros(count, wide), _widen(y.contiguous(), size)
     arrays = [tensor.numpy() for tensor in (y, gates, hidden, to_inputs, to_recurrent)]
     for t in reversed(range(frames)):
         _cell_back(back.numpy().ravel(), *(array[t].ravel() for array in arrays), wide // TRAINING_LANES)
         if t:
-            back[:, :size] += product(_narrowed(to_recurrent[t], size), w_h.t())
-    return _narrowed(to_inputs.flatten(0, 1), size), _narrowed(to_recurrent.flatten(0, 1), size)
+            back[:, :size] += product(_narrow(to_recurrent[t], size), w_h.t())
+    return _narrow(to_inputs.flatten(0, 1), size), _narrow(to_recurrent.flatten(0, 1), size)
 
 
-def _widened(rows: Tensor, size: int) -> Tensor:
+def _widen(rows: Tensor, size: int) -> Tensor:
     """Fill each of the k parts of rows (..., k H), H of this size, with 0 to a multiple of TRAINING_LANES."""
     if size % TRAINING_LANES == 0:
         return rows
     return nn.functional.pad(rows.unflatten(-1, (-1, size)), (0, -size % TRAINING_LANES)).flatten(-2)
 
 
-def _narrowed(rows: Tensor, size: int) -> Tensor:
-    """Return rows without the zeros of `_widened`."""
+def _narrow(rows: Tensor, size: int) -> Tensor:
+    """Return rows without the zeros of `_widen`."""
     return rows.unflatten(-1, (-1, size + -size % TRAINING_LANES))[..., :size].flatten(-2)
 
 

@@ -61,7 +61,7 @@ class FastSkin(torch.autograd.Function):
         if columns.shape[2] % TRAINING_LANES:
             columns = nn.functional.pad(columns, (0, -columns.shape[2] % TRAINING_LANES))
         posed = np.empty((len(entries), len(weights), 3, TRAINING_LANES), np.float32)
-        _posed(columns.contiguous().numpy().ravel(), *ctx.moving, posed.ravel())
+        _pose(columns.contiguous().numpy().ravel(), *ctx.moving, posed.ravel())
         return from_lanes(posed, *points.shape[:2])
 
     @staticmethod
@@ -70,7 +70,7 @@ class FastSkin(torch.autograd.Function):
         windows, frames, vertices, _ = above[0].shape
         weights, entries = ctx.moving
         back = np.empty((vertices, 3, len(entries), TRAINING_LANES), np.float32)
-        _turned_back(to_lanes(above[0]).ravel(), weights, entries, back.ravel())
+        _turn_back(to_lanes(above[0]).ravel(), weights, entries, back.ravel())
         columns = torch.from_numpy(back).flatten(2)[..., : frames * windows]
         return columns.unflatten(2, (frames, windows)).permute(3, 2, 0, 1), None, None
 
@@ -78,13 +78,13 @@ class FastSkin(torch.autograd.Function):
 # The point is copied into one small array of known size, for the compiler then knows that nothing
 # overlaps.
 @njit(cache=True, fastmath={"contract"}, error_model="numpy")
-def _posed(points: np.ndarray, weights: np.ndarray, entries: np.ndarray, out: np.ndarray) -> None:
+def _pose(points: np.ndarray, weights: np.ndarray, entries: np.ndarray, out: np.ndarray) -> None:
     """Pose flat points (V, 3, C, L) by weights (V, J), entries (C, J, 12 L) into flat out (C, V, 3, L)."""
     L, (vertices, joints), blocks = TRAINING_LANES, weights.shape, len(entries)
     u = np.empty(6 * L, np.float32)
     moving = np.empty(joints, np.int64)
     for v in range(vertices):
-        count = _moving(weights[v], moving)
+        count = _list_joints(weights[v], moving)
         for block in range(blocks):
             for axis in range(3):
                 copy_lanes(points, (3 * v + axis) * blocks + block, u, axis)
@@ -105,13 +105,13 @@ def _posed(points: np.ndarray, weights: np.ndarray, entries: np.ndarray, out: np
 
 
 @njit(cache=True, fastmath={"contract"}, error_model="numpy")
-def _turned_back(above: np.ndarray, weights: np.ndarray, entries: np.ndarray, out: np.ndarray) -> None:
+def _turn_back(above: np.ndarray, weights: np.ndarray, entries: np.ndarray, out: np.ndarray) -> None:
     """Compute the gradients by the points, laid out like these: the transpose of each rotation part."""
     L, (vertices, joints), blocks = TRAINING_LANES, weights.shape, len(entries)
     u = np.empty(6 * L, np.float32)
     moving = np.empty(joints, np.int64)
     for v in range(vertices):
-        count = _moving(weights[v], moving)
+        count = _list_joints(weights[v], moving)
         for block in range(blocks):
             for axis in range(3):
                 copy_lanes(above, 3 * (vertices * block + v) + axis, u, axis)
@@ -128,7 +128,7 @@ def _turned_back(above: np.ndarray, weights: np.ndarray, entries: np.ndarray, ou
 
 
 @njit(cache=True, error_model="numpy")
-def _moving(weights: np.ndarray, moving: np.ndarray) -> int:
+def _list_joints(weights: np.ndarray, moving: np.ndarray) -> int:
     """Write the joints that move a vertex of weights (J,) into moving (J,); return their number."""
     count = 0
     for joint in range(len(weights)):

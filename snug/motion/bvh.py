@@ -47,7 +47,7 @@ def read_bvh(path: Path, options: MotionFileOptions) -> Motion:
     places = np.zeros((len(parents), 3))
     for index, joint in enumerate(joints):
         places[index] = joint.offset + (places[joint.parent] if joint.parent >= 0 else 0.0)
-    axes, leg = _standing({name: places[index] for name, index in matches.items()})
+    axes, leg = _find_axes({name: places[index] for name, index in matches.items()})
     places = places @ axes
     directions = {
         joint: places[matches[child]] - places[matches[joint]]
@@ -89,7 +89,7 @@ def shift_of(joint: Joint, frames: np.ndarray) -> np.ndarray:
     return shift
 
 
-def _standing(at: Mapping[str, np.ndarray]) -> tuple[np.ndarray, float]:
+def _find_axes(at: Mapping[str, np.ndarray]) -> tuple[np.ndarray, float]:
     """Return our axes as columns (3, 3) in the zero pose with joints `at` (3,), and the length of its leg.
 
     Up is the axis nearest to the direction from ankles to head; left leads from hip to hip. Raises
@@ -141,9 +141,9 @@ def _expect(lines: Iterator[list[str]], *expected: str) -> list[str]:
 def _hierarchy(lines: Iterator[list[str]]) -> list[Joint]:
     """Return the joints of the lines up to the brace that closes the root. Raises ValueError."""
     joints: list[Joint] = []
-    open_joints: list[int] = []
+    stack: list[int] = []  # open joints
     columns = 0
-    while not joints or open_joints:
+    while not joints or stack:
         line = next(lines, ["the end"])
         word, *tokens = line
         word = word.lower()
@@ -151,19 +151,19 @@ def _hierarchy(lines: Iterator[list[str]]) -> list[Joint]:
             name = "" if word == "end" else " ".join(tokens)
             if name and name in [joint.name for joint in joints]:
                 raise ValueError(f"joint '{name[:40]}' has a name that is taken")
-            joints.append(Joint(name, open_joints[-1] if open_joints else -1, first=columns))
-            open_joints.append(len(joints) - 1)
+            joints.append(Joint(name, stack[-1] if stack else -1, first=columns))
+            stack.append(len(joints) - 1)
             _expect(lines, "{")
-        elif word == "offset" and open_joints:
-            joints[open_joints[-1]].offset = np.array(finite_numbers(tokens, 3))
-        elif word == "channels" and open_joints[-1:] == [len(joints) - 1] and not joints[-1].channels:
+        elif word == "offset" and stack:
+            joints[stack[-1]].offset = np.array(finite_numbers(tokens, 3))
+        elif word == "channels" and stack[-1:] == [len(joints) - 1] and not joints[-1].channels:
             joints[-1].channels = tuple(word.capitalize() for word in tokens[1:])
             columns += len(joints[-1].channels)
             names = CHANNELS.intersection(joints[-1].channels)
             if not tokens[:1] == [str(len(tokens) - 1)] == [str(len(names))]:
                 raise ValueError(f"'{' '.join(line)[:60]}' declares other channels than it names")
-        elif word == "}" and open_joints:
-            open_joints.pop()
+        elif word == "}" and stack:
+            stack.pop()
         else:
             raise ValueError(f"'{' '.join(line)[:40]}' is not known in a hierarchy, or out of place")
     return joints

@@ -13,7 +13,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from reference_sim.given_files import regular
+from reference_sim.given_files import demand_file
 from snug.body.skeleton import (
     BODY_JOINTS,
     JOINT,
@@ -46,7 +46,7 @@ def parse_lines(
             ValueError.
     """
     try:
-        if regular(path).stat().st_size > MAX_TEXT_BYTES:
+        if demand_file(path).stat().st_size > MAX_TEXT_BYTES:
             raise MotionError(f"larger than {MAX_TEXT_BYTES >> 20} MB; cut the clip")
         lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
     except OSError as problem:

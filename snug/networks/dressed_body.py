@@ -120,7 +120,7 @@ class DressedBody:
             parts.append(np.broadcast_to(shape, (len(motion.poses), len(shape))))
         return torch.from_numpy(np.concatenate(parts, axis=1).astype(np.float32))
 
-    def skinned(
+    def skin(
         self,
         motion: Motion,
         betas: np.ndarray | None = None,

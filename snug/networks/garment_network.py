@@ -114,12 +114,12 @@ _GENERATOR = threading.Lock()  # torch's generator is one for all threads
 
 
 @contextmanager
-def seeded(seed: int) -> Iterator[None]:
+def seed_torch(seed: int) -> Iterator[None]:
     """Draw from torch's CPU generator as from a seed, and give it back as it was; threads take turns.
 
-    >>> with seeded(0):
+    >>> with seed_torch(0):
     ...     first = torch.rand(1)
-    >>> with seeded(0):
+    >>> with seed_torch(0):
     ...     bool(torch.rand(1) == first)
     True
     """
@@ -167,7 +167,7 @@ def make_network(
         ((2, 3, 4, 3), None)
     """
     spec = find_kind(kind)
-    with seeded(seed):
+    with seed_torch(seed):
         network = spec.network(inputs, vertices, *spec.sizes)
         initialise(network, recipe.initialisation)
     network.output_scale = recipe.output_scale

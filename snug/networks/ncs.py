@@ -144,13 +144,13 @@ class TwoBranches(GarmentNetwork):
         motion = slice(x.start + POSE_NUMBERS, x.stop)
         for layer in self.joint_encoder:
             if isinstance(layer, nn.Linear):
-                motion = plan.add_linear(_repeated(layer, len(DESCRIBED)), motion, nn.ReLU)
+                motion = plan.add_linear(_repeat(layer, len(DESCRIBED)), motion, nn.ReLU)
         code = plan.add_layers(self.static_encoder, slice(x.start, x.start + POSE_NUMBERS))
         plan.add_sum(code, plan.add_gru(self.gru, plan.add_layers(self.dynamic_encoder, motion)))
         plan.add_offsets((self.offsets, plan.add_layers(self.decoder, code)))
 
 
-def _repeated(layer: nn.Linear, count: int) -> nn.Linear:
+def _repeat(layer: nn.Linear, count: int) -> nn.Linear:
     """Return a layer without bias that does the same to each of `count` pieces of its inputs."""
     whole = nn.Linear(count * layer.in_features, count * layer.out_features, bias=False)
     whole.weight = nn.Parameter(torch.block_diag(*[cast(Tensor, layer.weight.detach())] * count))

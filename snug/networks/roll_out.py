@@ -20,7 +20,7 @@ from snug.motion.motion import Motion
 from snug.networks.dressed_body import FEATURE_SETS, DressedBody
 from snug.networks.frame_layout import FramePlan, blocks_of_vertices
 from snug.networks.garment_network import GarmentNetwork
-from snug.networks.trained_model import TrainedModel, digest_of_triangles
+from snug.networks.trained_model import TrainedModel, digest_triangles
 from snug.recipe import DEFAULT
 
 WARM_UP = 10  # frames computed and thrown away, before the caller starts a clock
@@ -271,7 +271,7 @@ def _features(
     """
     if model.vertices != dressed.vertices:
         raise RollOutError(f"the model has {model.vertices} vertices, the garment {dressed.vertices}")
-    if model.triangles and model.triangles != digest_of_triangles(np.asarray(dressed.garment.faces)):
+    if model.triangles and model.triangles != digest_triangles(np.asarray(dressed.garment.faces)):
         raise RollOutError(
             "the model is of a garment with as many vertices and other triangles: tailor the garment that it "
             "was trained for, or train one for this"

@@ -29,14 +29,14 @@ def write_tensors(path: Path, tensors: Mapping[str, Tensor], header: Mapping[str
     plain = {name: tensor.detach().cpu().contiguous() for name, tensor in tensors.items()}
     with replacing(path) as unfinished:
         # By Python: what the library raises on a full disk does not say that it was that.
-        unfinished.write_bytes(_packed(plain, {**header, DIGEST: _digest(plain, header)}))
+        unfinished.write_bytes(_pack(plain, {**header, DIGEST: _digest(plain, header)}))
     return path
 
 
 def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     """Read tensors and header. Raises TensorFileError for a missing, broken, changed or foreign file."""
     tensors, text = _read(path, "pt")
-    header = _parsed(path, text)
+    header = _parse(path, text)
     if header.pop(DIGEST, None) != _digest(tensors, header):
         raise TensorFileError(f"{path}: is not as it was written: copy it again, or train again")
     return tensors, header
@@ -44,7 +44,7 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
 
 def read_header(path: Path) -> dict[str, Any]:
     """Read the header alone, without torch and unchecked against its digest. Raises TensorFileError."""
-    return _parsed(path, _read(path, "numpy", tensors=False)[1])
+    return _parse(path, _read(path, "numpy", tensors=False)[1])
 
 
 def _read(path: Path, framework: str, *, tensors: bool = True) -> tuple[dict[str, Tensor], str | None]:
@@ -61,7 +61,7 @@ def _read(path: Path, framework: str, *, tensors: bool = True) -> tuple[dict[str
         raise TensorFileError(f"{path}: not a safetensors file ({error})") from error
 
 
-def _parsed(path: Path, text: str | None) -> dict[str, Any]:
+def _parse(path: Path, text: str | None) -> dict[str, Any]:
     if text is None:
         raise TensorFileError(f"{path}: no model of this project (its header has no '{HEADER}' entry)")
     try:
@@ -75,11 +75,11 @@ def select_tensors(tensors: Mapping[str, Tensor], name: str) -> dict[str, Tensor
     return {key.removeprefix(f"{name}."): t for key, t in tensors.items() if key.startswith(f"{name}.")}
 
 
-def _packed(tensors: dict[str, Tensor], header: Mapping[str, Any]) -> bytes:
+def _pack(tensors: dict[str, Tensor], header: Mapping[str, Any]) -> bytes:
     from safetensors.torch import save
 
     return save(tensors, {HEADER: json.dumps(header)})
 
 
 def _digest(tensors: dict[str, Tensor], header: Mapping[str, Any]) -> str:
-    return hashlib.sha256(_packed(tensors, header)).hexdigest()
+    return hashlib.sha256(_pack(tensors, header)).hexdigest()

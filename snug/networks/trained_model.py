@@ -12,7 +12,7 @@ import numpy as np
 from snug.networks.garment_network import GarmentNetwork, make_network
 from snug.networks.tensor_file import TensorFileError, read_tensors, write_tensors
 from snug.recipe import Recipe
-from snug.trained import trained_networks
+from snug.trained import list_networks
 
 MODEL_FORMAT = "snug-model-10"
 _COPIED = (
@@ -41,7 +41,7 @@ class TrainedModel:
         summary: numbers and names of high windows, of updates left out, of returns to good weights.
         unit: of the loss: joules, or a distance from the simulated vertices.
         fps: frame rate of the training motions [1/s]; 0 where it is not known.
-        triangles: digest of the garment's triangles, see digest_of_triangles; empty where it is not
+        triangles: digest of the garment's triangles, see digest_triangles; empty where it is not
             known.
         origin: what is known of its training: data, commit, versions, processor, and digests of all that
             it depends on, see benchmarks.runner.networks; empty where nobody noted it.
@@ -141,10 +141,10 @@ package: pbns-tshirt, ...
         return cls(data["kind"], network.eval(), recipe, **copied)
 
 
-def digest_of_triangles(faces: np.ndarray) -> str:
+def digest_triangles(faces: np.ndarray) -> str:
     """Return a digest of triangles (F, 3), which name vertices in their order: a network gives one for each.
 
-    >>> digest_of_triangles(np.array([[0, 1, 2]])) == digest_of_triangles(np.array([[1, 0, 2]]))
+    >>> digest_triangles(np.array([[0, 1, 2]])) == digest_triangles(np.array([[1, 0, 2]]))
     False
     """
     return hashlib.sha256(np.ascontiguousarray(faces, dtype="<i8").tobytes()).hexdigest()[:16]
@@ -152,7 +152,7 @@ def digest_of_triangles(faces: np.ndarray) -> str:
 
 def _find_file(path: str | Path) -> Path:
     """Return the file of a model, by its path or by its name in the package. Raises ModelFileError."""
-    networks = trained_networks()
+    networks = list_networks()
     if isinstance(path, str) and path in networks:
         return networks[path]
     if isinstance(path, str) and not Path(path).suffix and not Path(path).exists():

@@ -22,6 +22,6 @@ def network_name(network: str, garment: str, seed: int) -> str:
     return f"{network}-{garment}" + (f"-seed{seed}" if seed else "")
 
 
-def trained_networks() -> dict[str, Path]:
+def list_networks() -> dict[str, Path]:
     """Return name -> file of every network of the package, by name."""
     return {path.stem: path for path in sorted(FOLDER.glob(f"*{SUFFIX}"))}

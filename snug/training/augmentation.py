@@ -89,10 +89,10 @@ def make_mixed_clips(
     """
     random = np.random.default_rng(seed)
     count = max(1, round(frames / CLIP_FRAMES)) if frames > 0 else 0
-    return [_mixed(motions, random, turn, lifted, f"mixed_{number}") for number in range(count)]
+    return [_mix(motions, random, turn, lifted, f"mixed_{number}") for number in range(count)]
 
 
-def _mixed(
+def _mix(
     motions: Sequence[Motion], random: np.random.Generator, turn: float, lifted: float, name: str
 ) -> Motion:
     poses = np.zeros((CLIP_FRAMES, len(JOINT), 3))

@@ -40,8 +40,8 @@ class CapturedTrainer(Trainer):
             and self.data.shapes is None
         )
         self.captured_steps = self._asked = 0
-        self._descent = CudaGraph(self._differentiated, self.device)
-        self._following = CudaGraph(self._followed, self.device, warm_up=0)
+        self._descent = CudaGraph(self._differentiate, self.device)
+        self._following = CudaGraph(self._follow, self.device, warm_up=0)
         self._names: tuple[str, ...] = ()
         self._held: dict[str, Any] = {}
 
@@ -94,19 +94,19 @@ class CapturedTrainer(Trainer):
         terms = numbers[:-1].reshape(self._held["shape"])
         return dict(zip(self._held["terms"], terms.swapaxes(0, 1))), float(numbers[-1])
 
-    def _differentiated(self, *inputs: Tensor) -> dict[str, Any]:
+    def _differentiate(self, *inputs: Tensor) -> dict[str, Any]:
         """Run forward and backward; return what the rest of the step reads. inputs: see `_gradients`."""
         named = dict(zip(self._names, inputs))
         assert self.loss is not None
         rows = named["rows"].to(self.device)
         self.optimiser.zero_grad(set_to_none=True)
-        batch = self.data.gathered(rows, named.get("betas"))
+        batch = self.data.gather(rows, named.get("betas"))
         offsets, end = self.network(batch.features, named.get("state"))
         x = self.posed_by(offsets + batch.rest, self.weights, batch.transforms)
         planes = posed = anchors = None
         if self.contact:
-            posed = self.contact.bodies.posed(batch)
-            anchors = self.contact.walked(rows.flatten(), named["first"], posed, x)
+            posed = self.contact.bodies.pose(batch)
+            anchors = self.contact.walk(rows.flatten(), named["first"], posed, x)
             assert isinstance(self.contact.cache, TensorContactCache)
             at = self.contact.cache.planes_at(*anchors, *posed[1:])
             planes = at[0].unflatten(0, rows.shape), at[1].unflatten(0, rows.shape)
@@ -121,7 +121,7 @@ class CapturedTrainer(Trainer):
             "posed": posed, "anchors": anchors, "rows": rows, "gradients": gradients,
         }  # fmt: skip
 
-    def _followed(self) -> None:
+    def _follow(self) -> None:
         """Follow the gradients, and keep the places of the anchors."""
         held = self._held
         taught = [p for p in self.network.parameters() if p.grad is not None]

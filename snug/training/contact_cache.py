@@ -58,7 +58,7 @@ class Patch:
         self.sample_rest, self.region = samples.astype(np.float32), region
         self.adjacency = triangle_adjacency(self.faces)
         self.tree = FaceSearch(self.faces, self.centroids)
-        self.samples = self.tree.listed(self.sample_rest, region)
+        self.samples = self.tree.group(self.sample_rest, region)
 
     def search(
         self, points: np.ndarray, positions: np.ndarray, anchor_faces: np.ndarray | None = None, *,

@@ -14,7 +14,7 @@ from torch import Tensor
 from reference_sim.geometry.surface import faces_around
 from snug.kernels.contact import CROSSINGS, WALK_SLACK
 from snug.training.contact_cache import PARTS, ContactCache, Patch, quantise
-from snug.training.device import CudaGraph, compiled
+from snug.training.device import CudaGraph, compile_for
 
 Anchors = tuple[Tensor, Tensor]  # faces (N, S) and barycentric coordinates (N, S, 2)
 NEAREST = 3  # body vertices whose faces are tried for each sample
@@ -39,8 +39,8 @@ class TensorContactCache:
         self.adjacency = torch.as_tensor(patch.adjacency, device=device).long()  # (Q, 3)
         around = incident(patch.faces)
         self.around = torch.as_tensor(around, device=device)  # (P, K) faces, -1 beyond the last
-        self._walk, self.planes_at = compiled(self._walked, device), compiled(self._planes, device)
-        self._closest = CudaGraph(self._searched_in_parts, device)
+        self._walk, self.planes_at = compile_for(self._move, device), compile_for(self._planes, device)
+        self._closest = CudaGraph(self._search_in_parts, device)
 
     def normals(self, positions: Tensor) -> Tensor:
         """Return area-weighted vertex normals (N, P, 3) of positions (N, P, 3), rounded to 1/127."""
@@ -49,7 +49,7 @@ class TensorContactCache:
             127.0 * normals / (torch.linalg.vector_norm(normals, dim=-1, keepdim=True) + 1e-30)
         ).round()
 
-    def held(self, frames: Tensor) -> Anchors:
+    def anchors(self, frames: Tensor) -> Anchors:
         """Return the anchors of frames (N,)."""
         return self.faces[frames], self.barycentric[frames]
 
@@ -64,7 +64,7 @@ class TensorContactCache:
         directions = (weights * normals[row, corners]).sum(-2)
         return points, directions / (torch.linalg.vector_norm(directions, dim=-1, keepdim=True) + 1e-30)
 
-    def walked(
+    def walk(
         self, samples: Tensor, frames: Tensor, first: Tensor, positions: Tensor, normals: Tensor, *,
         reach: float,
     ) -> Anchors:  # fmt: skip
@@ -74,14 +74,14 @@ class TensorContactCache:
         twice walks once, as its first garment has it. first (N,): see `first_places`; positions, normals:
         bodies (N, P, 3).
         """
-        faces, barycentric = self._walk(samples, *self.held(frames), positions, normals, reach)
+        faces, barycentric = self._walk(samples, *self.anchors(frames), positions, normals, reach)
         return faces[first], barycentric[first]
 
     def place(self, frames: Tensor, anchors: Anchors) -> None:
         """Keep anchors of frames (N,); those of a frame that comes twice must be equal."""
         self.faces[frames], self.barycentric[frames] = anchors
 
-    def _walked(
+    def _move(
         self,
         x: Tensor,
         faces: Tensor,
@@ -119,14 +119,14 @@ class TensorContactCache:
         """
         self.faces[frame], self.barycentric[frame] = self._closest(points, positions)
 
-    def _searched_in_parts(self, points: Tensor, positions: Tensor) -> Anchors:
+    def _search_in_parts(self, points: Tensor, positions: Tensor) -> Anchors:
         """Return the closest anchors of samples (S, 3) on a body (P, 3), part by part."""
         parts = zip(points.split(CHUNK), self.sample_rest.split(CHUNK))
-        searches = [self._searched(point, home, positions) for point, home in parts]
+        searches = [self._search(point, home, positions) for point, home in parts]
         faces, barycentric = (torch.cat(pieces) for pieces in zip(*searches))
         return faces, quantise(barycentric)
 
-    def _searched(self, points: Tensor, home: Tensor, positions: Tensor) -> tuple[Tensor, Tensor]:
+    def _search(self, points: Tensor, home: Tensor, positions: Tensor) -> tuple[Tensor, Tensor]:
         distances = torch.cdist(points, positions)
         inside = torch.cdist(home, self.rest) < self.patch.region
         distances = torch.where(inside | ~inside.any(1, keepdim=True), distances, torch.inf)

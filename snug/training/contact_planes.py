@@ -26,7 +26,7 @@ from snug.training.contact_cache_torch import (
     incident,
     normal_sums,
 )
-from snug.training.device import compiled
+from snug.training.device import compile_for
 from snug.training.physics_loss import Planes
 from snug.training.training_set import Batch, TrainingSet
 
@@ -57,31 +57,31 @@ class BodyPatches:
         if body.pose_directions is not None:
             correctives = body.pose_directions[vertices]
             self.correctives = torch.as_tensor(correctives, dtype=torch.float32, device=device)
-        self._pose = compiled(self._posed_by_torch, device)
-        self.kept = self._posed_everywhere() if fixed and self.kernels else None
+        self._pose = compile_for(self._pose_by_torch, device)
+        self.kept = self._pose_everywhere() if fixed and self.kernels else None
 
-    def posed(self, batch: Batch) -> Posed:
+    def pose(self, batch: Batch) -> Posed:
         """Return the body in the poses of a batch."""
         if self.kept is not None:
             return batch.frames.ravel(), *self.kept
         rows = np.arange(batch.transforms.shape[0] * batch.transforms.shape[1])
         if not self.kernels:
-            return rows, *self._pose(self._unposed(batch), batch.transforms)
+            return rows, *self._pose(self._shape_patches(batch), batch.transforms)
         # the first frames of all windows, then the second ones
         by_time = rows.reshape(batch.transforms.shape[1::-1]).T.ravel()
-        return by_time, *self._posed_by_kernels(self._unposed(batch), batch.transforms)
+        return by_time, *self._pose_by_kernels(self._shape_patches(batch), batch.transforms)
 
     @cached_property
     def marks(self) -> np.ndarray:
         """Some vertices of the patch in every frame, (F, M, 3) [m], by which poses are compared."""
         weights = self.weights[::MARKED].cpu()
         return np.concatenate([
-            skin(self._corrected(rest.cpu(), part, MARKED), weights, part).numpy()
-            for rest, frames in self._worn()
+            skin(self._correct(rest.cpu(), part, MARKED), weights, part).numpy()
+            for rest, frames in self._list_patches()
             for part in self.data.transforms[frames].cpu().split(POSED_TOGETHER)
         ])  # fmt: skip
 
-    def _unposed(self, batch: Batch) -> Tensor:
+    def _shape_patches(self, batch: Batch) -> Tensor:
         """Return the unposed patches of a batch, (P, 3) or one for each window (N, 1, P, 3)."""
         if batch.betas is None:
             return self.template
@@ -89,7 +89,7 @@ class BodyPatches:
         moved = torch.tensordot(self.directions, batch.betas, ([2], [1]))
         return (self.template[..., None] + moved).permute(2, 0, 1)[:, None]
 
-    def _corrected(self, rest: Tensor, transforms: Tensor, every: int = 1) -> Tensor:
+    def _correct(self, rest: Tensor, transforms: Tensor, every: int = 1) -> Tensor:
         """Return patch positions (..., P, 3), or every so many of them, with pose correctives."""
         rest = rest[..., ::every, :]
         if self.correctives is None:
@@ -97,31 +97,31 @@ class BodyPatches:
         parents, directions = self.data.dressed.parents, self.correctives[::every].to(rest.device)
         return add_pose_correctives(rest, directions, transforms, parents)
 
-    def _posed_by_torch(self, rest: Tensor, transforms: Tensor) -> tuple[Tensor, Tensor]:
+    def _pose_by_torch(self, rest: Tensor, transforms: Tensor) -> tuple[Tensor, Tensor]:
         """Pose rest (..., P, 3) by transforms (N, T, J, 3, 4); return positions and normals (N T, P, 3)."""
-        positions = skin(self._corrected(rest, transforms), self.weights, transforms).flatten(0, 1)
+        positions = skin(self._correct(rest, transforms), self.weights, transforms).flatten(0, 1)
         return positions, self.normals(positions)
 
-    def _posed_by_kernels(self, rest: Tensor, transforms: Tensor) -> tuple[np.ndarray, np.ndarray]:
+    def _pose_by_kernels(self, rest: Tensor, transforms: Tensor) -> tuple[np.ndarray, np.ndarray]:
         """Pose rest (P, 3) or (N, 1, P, 3) by (N, T, J, 3, 4); return positions, normals (T N, P, 3)."""
-        points = self._corrected(rest, transforms).expand(*transforms.shape[:2], -1, -1)
+        points = self._correct(rest, transforms).expand(*transforms.shape[:2], -1, -1)
         posed = FastSkin.apply(points, self.weights, transforms)
         positions = posed.transpose(0, 1).flatten(0, 1).contiguous().numpy()
         return positions, self.normals(positions)
 
-    def _posed_everywhere(self) -> tuple[np.ndarray, np.ndarray]:
+    def _pose_everywhere(self) -> tuple[np.ndarray, np.ndarray]:
         """Compute patch positions and normals (F, P, 3) of every frame."""
         shape = self.data.frames, *self.template.shape
         positions, normals = np.empty(shape, np.float32), np.empty(shape, np.int8)
-        for rest, frames in self._worn():
+        for rest, frames in self._list_patches():
             for start in range(frames.start, frames.stop, POSED_TOGETHER):
                 some = slice(start, min(start + POSED_TOGETHER, frames.stop))
-                positions[some], normals[some] = self._posed_by_kernels(
+                positions[some], normals[some] = self._pose_by_kernels(
                     rest, self.data.transforms[None, some]
                 )
         return positions, normals
 
-    def _worn(self) -> Iterator[tuple[Tensor, slice]]:
+    def _list_patches(self) -> Iterator[tuple[Tensor, slice]]:
         """Yield unposed patches (P, 3) and the frames of each: motion by motion, or one for all frames."""
         shapes, first = self.data.shapes, self.data.first
         if shapes is None:
@@ -153,7 +153,7 @@ class NearestVertices:
         """Return points and normals (N, T, V, 3) of garments x (N, T, V, 3) in the poses of a batch [m]."""
         from scipy.spatial import cKDTree
 
-        _, *posed = self.bodies.posed(batch)
+        _, *posed = self.bodies.pose(batch)
         # What is no number, the loss says.
         garments = np.nan_to_num(x.detach().flatten(0, 1).cpu().numpy())
         nearest = [
@@ -187,7 +187,7 @@ class TrainingContact:
         body, device = data.dressed.body, data.device
         self.data, self.contact = data, contact
         self.kernels, self.age = kernels, np.zeros(data.frames, np.int64)
-        self.patch = Patch(contact.rest_samples, body.shaped(), body.faces)
+        self.patch = Patch(contact.rest_samples, body.rest_vertices(), body.faces)
         frames = data.frames
         self.cache = (
             ContactCache(self.patch, frames)
@@ -221,18 +221,18 @@ class TrainingContact:
         frames = torch.as_tensor(flat, device=self.data.device)
         if x is not None:
             first = torch.as_tensor(first_places(flat), device=self.data.device)
-            self.cache.place(frames, self.walked(frames, first, posed, x))
-        points, normals = self.cache.planes_at(*self.cache.held(frames), *posed[1:])
+            self.cache.place(frames, self.walk(frames, first, posed, x))
+        points, normals = self.cache.planes_at(*self.cache.anchors(frames), *posed[1:])
         return points.unflatten(0, batch.frames.shape), normals.unflatten(0, batch.frames.shape)
 
-    def walked(self, frames: Tensor, first: Tensor, posed: Posed, x: Tensor) -> Anchors:
+    def walk(self, frames: Tensor, first: Tensor, posed: Posed, x: Tensor) -> Anchors:
         """Return where the anchors of frames (N T,) walk to vertices x (N, T, V, 3); keep and await nothing.
 
         first (N T,): see snug.training.contact_cache_torch.first_places.
         """
         assert isinstance(self.cache, TensorContactCache)
         samples = self._samples(x.detach().flatten(0, 1))
-        return self.cache.walked(samples, frames, first, *posed[1:], reach=self.contact.margin)
+        return self.cache.walk(samples, frames, first, *posed[1:], reach=self.contact.margin)
 
     def search_first(self, weights: Tensor) -> None:
         """Search where the skinned template touches, in enough frames to propagate to all others.
@@ -241,13 +241,13 @@ class TrainingContact:
         """
         data, frame, start = self.data, 0, 0
         while start < data.frames:
-            source, frame = frame, self._near(start, FIRST_REACH, FIRST_NEAR).stop - 1
+            source, frame = frame, self._slice_around(start, FIRST_REACH, FIRST_NEAR).stop - 1
             batch = data.at(np.array([[frame]]))
             x = skin(batch.rest, weights, batch.transforms)
-            rows, positions, _ = self.bodies.posed(batch)
+            rows, positions, _ = self.bodies.pose(batch)
             self.cache.faces[frame] = self.cache.faces[source]  # a good place to begin
             self.cache.requery(frame, self._samples(x[0, 0]), positions[rows[0]])
-            end = self._near(frame, FIRST_REACH, FIRST_NEAR).stop
+            end = self._slice_around(frame, FIRST_REACH, FIRST_NEAR).stop
             self._propagate(frame, np.arange(start, end))
             start = end
         self._changed[:] = False  # a resumed run makes these anchors again
@@ -264,10 +264,10 @@ class TrainingContact:
         self.search(oldest * window + window // 2, frames, posed, x)
         searched = np.unique(middle[oldest])
         for frame in searched:
-            around = self._near(int(frame), REACH, NEAR)
+            around = self._slice_around(int(frame), REACH, NEAR)
             self._propagate(int(frame), np.setdiff1d(np.arange(around.start, around.stop), searched))
 
-    def _near(self, frame: int, reach: int, shift: float) -> slice:
+    def _slice_around(self, frame: int, reach: int, shift: float) -> slice:
         """Return the frames around one, of the same motion and at most `reach` off.
 
         They end where a mark has moved by `shift` [m].

@@ -41,7 +41,7 @@ def find_device(name: str) -> torch.device:
     return device
 
 
-def compiled(function: Callable[P, R], device: torch.device) -> Callable[P, R]:
+def compile_for(function: Callable[P, R], device: torch.device) -> Callable[P, R]:
     """Return the function compiled by torch for a GPU, where launching small kernels takes most of the time.
 
     It is returned as it is on a CPU, where the kernels take its place, and where Triton or a C compiler
@@ -77,7 +77,7 @@ class CudaGraph:
         if self.device.type != "cuda":
             return self.function(*inputs)
         if self._graph is None:
-            self._graph = self._captured(inputs)
+            self._graph = self._capture(inputs)
         for slot, value in zip(self._inputs, inputs, strict=True):
             assert (slot.shape, slot.dtype) == (value.shape, value.dtype), (
                 "a graph takes one size of inputs"
@@ -86,7 +86,7 @@ class CudaGraph:
         self._graph.replay()
         return self._outputs
 
-    def _captured(self, inputs: tuple[Tensor, ...]) -> torch.cuda.CUDAGraph:
+    def _capture(self, inputs: tuple[Tensor, ...]) -> torch.cuda.CUDAGraph:
         self._inputs = tuple(value.to(self.device, copy=True) for value in inputs)
         side, here = torch.cuda.Stream(self.device), torch.cuda.current_stream(self.device)
         side.wait_stream(here)

@@ -23,7 +23,7 @@ from snug.networks.tensor_file import select_tensors
 from snug.recipe import Recipe
 from snug.training.augmentation import make_training_set, varies_shape
 from snug.training.contact_planes import NearestVertices, Posed, TrainingContact
-from snug.training.device import CPU, compiled
+from snug.training.device import CPU, compile_for
 from snug.training.divergence_guard import SETTLING, DivergenceGuard, live_tensors
 from snug.training.physics_loss import PhysicsLoss
 from snug.training.simulated_data import TARGETS, Trajectories, VertexTargets
@@ -75,7 +75,7 @@ class Trainer:
         self.kind, self.spec, self.recipe, self.steps, self.seed = kind, spec, recipe, steps, seed
         self.device = device
         self.kernels = device.type == "cpu" if kernels is None else kernels
-        self.posed_by = FastSkin.apply if self.kernels else compiled(skin, device)
+        self.posed_by = FastSkin.apply if self.kernels else compile_for(skin, device)
         self.data = make_training_set(spec, dressed, motions, recipe, seed=seed, device=device)
         self.shaped = varies_shape(spec, dressed, recipe) and recipe.shape_of == "window"
         self.dressed, self.weights = dressed, dressed.weights(recipe.smoothing).to(device)
@@ -155,9 +155,9 @@ class Trainer:
             betas = self.random.uniform(-1, 1, (len(windows), shapes)) * self.recipe.shape_range
         state = self.start_state(self.data.frames_of(windows))
         means = self.learn(number, windows, betas, state)
-        return {"loss": sum(self.weighed(means).values()), **means}
+        return {"loss": sum(self.weigh(means).values()), **means}
 
-    def weighed(self, terms: Mapping[str, Any]) -> dict[str, Any]:
+    def weigh(self, terms: Mapping[str, Any]) -> dict[str, Any]:
         """Return numbers or tensors of terms as they stand in the loss: name -> factor times term."""
         return {name: self.factors.get(name, 1.0) * term for name, term in terms.items()}
 
@@ -177,12 +177,12 @@ class Trainer:
         distances = self.targets.distances(x, batch) if self.targets else {}
         planes = posed = None
         if self.contact:
-            posed = self.contact.bodies.posed(batch)
+            posed = self.contact.bodies.pose(batch)
             planes = self.contact.planes(batch, posed, x)
         elif self.nearest:
             planes = self.nearest.planes(batch, x)
         terms = self.loss(x, batch.lead, planes, lag=batch.lag)
-        if self.contact and posed and self._searched_for_high(number, batch.frames, posed, x, terms):
+        if self.contact and posed and self._search_high(number, batch.frames, posed, x, terms):
             planes = self.contact.planes(batch, posed)
             terms = self.loss(x, batch.lead, planes, lag=batch.lag)
         means, trusted = self._update(number, windows, distances | terms)
@@ -194,7 +194,7 @@ class Trainer:
                 self.contact.requery(batch.frames, posed, x)
         return means
 
-    def _searched_for_high(
+    def _search_high(
         self, number: int, frames: np.ndarray, posed: Posed, x: Tensor, terms: dict[str, Tensor]
     ) -> bool:
         """Search the anchors of windows (N, T) above the spike limit at once; return whether there are any.
@@ -220,7 +220,7 @@ class Trainer:
         For TailorNet it is the dropout masks; a network with a lead reads the frames before.
         """
         if self.network.lead:
-            return self.network.state_after(self.data.before(frames[:, 0], self.network.lead))
+            return self.network.state_after(self.data.gather_past(frames[:, 0], self.network.lead))
         state = self.network.random_state(len(frames), self.recipe.h0_sigma, self.noise)
         if state is None:
             return None
@@ -251,7 +251,7 @@ class Trainer:
         stacked = torch.stack(list(terms.values()), 1)  # (N, terms, T)
         means = dict(zip(terms, stacked.detach().mean((0, 2)).tolist()))
         if self.factors:
-            stacked = torch.stack(list(self.weighed(terms).values()), 1)
+            stacked = torch.stack(list(self.weigh(terms).values()), 1)
         joules = stacked.detach().sum(1).mean(1).cpu().numpy()
         verdict = self.guard.judge(number, joules, self.namer(windows))
         if verdict == "leave out":
@@ -269,7 +269,7 @@ class Trainer:
 
     def namer(self, windows: np.ndarray) -> Callable[[int], str]:
         """Return what names a window of a step by its place among `windows` (N,)."""
-        return lambda row: self.data.where(self.data.starts[windows[row]])
+        return lambda row: self.data.name_frame(self.data.starts[windows[row]])
 
     def state(self) -> tuple[dict[str, Tensor], dict[str, Any]]:
         """Return everything that the next step depends on: tensors, and plain facts for a JSON header."""

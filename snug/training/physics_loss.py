@@ -58,7 +58,7 @@ from reference_sim.kernels.fast_kernels import (
 from reference_sim.material import GRAVITY
 from snug.kernels.skinning import from_lanes, to_lanes
 from snug.recipe import TERMS, Recipe, find_energy
-from snug.training.device import CPU, compiled
+from snug.training.device import CPU, compile_for
 
 BENDING = 5e-5  # [J]
 AREAL_DENSITY = 0.3  # [kg/m^2]
@@ -212,7 +212,7 @@ class PhysicsLoss:
             name: term if kernels and has_closed_form(term) else on_device(term, device)
             for name, term in static_terms(cloth, recipe).items()
         }
-        self._definitions = compiled(self._defined, device)
+        self._definitions = compile_for(self._evaluate, device)
         self._batches: dict[str, BatchKernel] = {}
         if kernels:
             batches = {name: fast_kernel(term, "training_batch") for name, term in self.static.items()}
@@ -242,9 +242,9 @@ class PhysicsLoss:
             return self._definitions(x, lead, planes, lag, {})
         kernels = self._kernels(x, lead, planes)
         closed = dict(zip(kernels, ClosedForms.apply(x, *kernels.values()) if kernels else ()))
-        return self._defined(x, lead, planes, lag, closed)
+        return self._evaluate(x, lead, planes, lag, closed)
 
-    def _defined(
+    def _evaluate(
         self,
         x: Tensor,
         lead: Tensor,

@@ -16,7 +16,7 @@ from reference_sim.command_line import progress_bar
 from snug.kinds import find_kind
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
-from snug.networks.trained_model import TrainedModel, digest_of_triangles
+from snug.networks.trained_model import TrainedModel, digest_triangles
 from snug.recipe import Recipe
 from snug.training.captured_step import CapturedTrainer
 from snug.training.checkpoint import Checkpoint, describe_run
@@ -125,7 +125,7 @@ class TrainingLoop:
             trainer.kind, trainer.network.cpu().eval(), trainer.recipe, seed=trainer.seed, steps=self.done,
             seconds=self.seconds + time.perf_counter() - self._started, setup_seconds=self.setup_seconds,
             history=self.history, summary=summary, unit=trainer.spec.unit, fps=1.0 / trainer.data.dt,
-            triangles=digest_of_triangles(trainer.dressed.garment.faces),
+            triangles=digest_triangles(trainer.dressed.garment.faces),
         )  # fmt: skip
 
 

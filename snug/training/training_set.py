@@ -20,7 +20,7 @@ from snug.body.skinning import joint_transforms
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
 from snug.recipe import Recipe
-from snug.training.device import CPU, compiled
+from snug.training.device import CPU, compile_for
 
 # Smallest spread by which an input is divided: rotations are numbers up to 1 in size, and one that hardly
 # moved in training, as the necks of clips made by tables, must not explode on a motion where it does.
@@ -97,7 +97,7 @@ class TrainingSet:
             torch.as_tensor(body.joint_template, device=device),
             torch.as_tensor(body.joint_directions, device=device),
         )
-        self._repose = compiled(_reposed, device)
+        self._repose = compile_for(_repose, device)
         self.window = recipe.window if sequences else 1
         stride = recipe.window_stride if sequences else 1
         self.starts = np.concatenate(
@@ -118,7 +118,7 @@ class TrainingSet:
         """Return the places of the motions that row numbers belong to."""
         return np.searchsorted(self.first, frames, side="right") - 1
 
-    def where(self, frame: int) -> str:
+    def name_frame(self, frame: int) -> str:
         """Name a row number by motion and frame."""
         motion = int(self.motion_of(frame))
         return f"motion {self.names[motion]!r} frame {frame - self.first[motion]}"
@@ -144,15 +144,15 @@ class TrainingSet:
         """
         rows = torch.as_tensor(frames, device=self.device)
         if betas is not None:
-            return replace(self.gathered(rows, torch.as_tensor(betas, device=self.device)), frames=frames)
-        batch = replace(self.gathered(rows), frames=frames)
+            return replace(self.gather(rows, torch.as_tensor(betas, device=self.device)), frames=frames)
+        batch = replace(self.gather(rows), frames=frames)
         if self.shapes is None:
             return batch
-        return self._dressed(
+        return self._dress(
             batch, torch.as_tensor(self.shapes[self.motion_of(frames[:, 0])], device=self.device)
         )
 
-    def gathered(self, rows: Tensor, betas: Tensor | None = None) -> Batch:
+    def gather(self, rows: Tensor, betas: Tensor | None = None) -> Batch:
         """Return rows (N, T) on the device, each line on the mean body or that of shape numbers (N, S).
 
         The batch does not know its frames.
@@ -162,13 +162,13 @@ class TrainingSet:
         if betas is None:
             return batch
         reposed = self._repose(self.dressed.parents, *self._skeleton, batch.transforms, betas.double())
-        batch = self._dressed(replace(batch, transforms=reposed), betas)
+        batch = self._dress(replace(batch, transforms=reposed), betas)
         assert batch.betas is not None
         repeated = batch.betas[:, None].expand(-1, rows.shape[1], -1)
         inputs = torch.cat([batch.features[..., : -betas.shape[1]], repeated], -1)
         return replace(batch, features=inputs)
 
-    def before(self, frames: np.ndarray, count: int) -> Tensor:
+    def gather_past(self, frames: np.ndarray, count: int) -> Tensor:
         """Return the features (N, count, D) before rows (N,), in place of missing ones a motion's first."""
         first = self.first[self.motion_of(frames)]
         rows = np.maximum(frames[:, None] - np.arange(count, 0, -1), first[:, None])
@@ -182,7 +182,7 @@ class TrainingSet:
         """Return windows (N,) as tensors, see `at`."""
         return self.at(self.frames_of(windows), betas)
 
-    def _dressed(self, batch: Batch, betas: Tensor) -> Batch:
+    def _dress(self, batch: Batch, betas: Tensor) -> Batch:
         """Return the batch with the unposed garments of shapes (N, S)."""
         shapes = betas.float()
         if self._rest_directions is None:
@@ -191,7 +191,7 @@ class TrainingSet:
         return replace(batch, rest=rest[:, None], betas=shapes)
 
 
-def _reposed(
+def _repose(
     parents: Sequence[int], template: Tensor, directions: Tensor, transforms: Tensor, betas: Tensor
 ) -> Tensor:
     """Return the same poses on other skeletons; rotations are read from the transforms of the mean body.

@@ -19,7 +19,7 @@ from functools import cache
 
 import numpy as np
 
-from benchmarks.validation.clamped_strip import Strip, clamped_strip, integrated_elastica
+from benchmarks.validation.clamped_strip import Strip, clamped_strip, solve_elastica
 from fabrics import SCALED, SNUG, Fabric
 from reference_sim import GRAVITY, Cloth, Material
 
@@ -40,7 +40,7 @@ def master_curve() -> tuple[np.ndarray, np.ndarray]:
     s, y = np.linspace(0, 1, 200), np.zeros((4, 200))
     angles = []
     for gamma in gammas:
-        s, y = integrated_elastica(gamma, 0.0, s, y)
+        s, y = solve_elastica(gamma, 0.0, s, y)
         angles.append(np.arctan2(y[3, -1], y[2, -1]))
     return gammas, np.array(angles)
 

@@ -114,7 +114,7 @@ def _metrics() -> dict[str, Any]:
     without = ("title", "definition", "table", "declared_in")  # prose, and how a report shows it
     return {
         name: {field: value for field, value in asdict(metric).items() if field not in without}
-        for name, metric in metrics.declared().items()
+        for name, metric in metrics.list_metrics().items()
     }
 
 
@@ -182,7 +182,7 @@ def _motion_of_one_more_degree(name: str, make: Callable[[str], Motion] = librar
     [
         ("motions", library, "make_motion", _motion_of_one_more_degree),
         ("materials", material, "Material", partial(material.Material, bending_stiffness=4e-5)),
-        ("metrics", metrics, "declared", dict),
+        ("metrics", metrics, "list_metrics", dict),
         ("reference", Newton.__init__, "__kwdefaults__", {"tolerance": 1e-5}),
         ("sampling", surface_distance, "SAMPLED_FRAMES", 24),
         ("statistics", recorded, "TIE", 0.1),

@@ -13,7 +13,7 @@ import pytest
 
 from benchmarks import provenance
 from benchmarks.declarations import DeclarationError
-from benchmarks.provenance import PACKAGES, digest, files_of, find_module, imported_beside, software
+from benchmarks.provenance import PACKAGES, digest, files_of, find_imports, find_module, software
 from benchmarks.runner import schedule
 from tests.project.test_layers import LAYERS, imports
 
@@ -71,7 +71,7 @@ def test_a_users_file_counts_with_the_modules_beside_it_and_all_that_is_installe
     write(home.parent, name, "CHANGED = True\n" + (BESIDE | NOT_BESIDE)[name])
     after = software(str(home))
     assert [part for part in before if after.get(part) != before[part]] == [str(home)] * (name in BESIDE)
-    assert list(imported_beside(str(home))) == ["deep", "helper"]
+    assert list(find_imports(str(home))) == ["deep", "helper"]
 
 
 # What tasks import and what decides no result: names, files and their formats, origin, sizes that are

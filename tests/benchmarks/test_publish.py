@@ -56,7 +56,7 @@ def test_what_is_published_is_replaced_whole_or_left(tmp_path):
     keep(whole, target, Show(pictures=("lead",), networks=("pbns",)))
     published = RunFolder(target)
     assert published.read_rows() == rows and rows[0].moved == (("twin", 0.3333),)
-    assert not published.changed({"results.csv": digest_of_file(whole / "results.csv")})
+    assert not published.find_changes({"results.csv": digest_of_file(whole / "results.csv")})
     kept = [
         "energies.csv",
         "lead.png",

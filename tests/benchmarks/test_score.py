@@ -17,7 +17,7 @@ from benchmarks.plan.study import StudyError, option, read_study
 from benchmarks.presets import find_preset
 from benchmarks.provenance import digest
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.measurements import measured
+from benchmarks.runner.measurements import measure_roll_out
 from benchmarks.runner.schedule import Schedule
 from reference_sim import Trajectory
 from reference_sim.trajectory import write_obj
@@ -177,7 +177,7 @@ def test_a_pickle_that_brings_its_own_body_needs_no_scene(tmp_path, capsys):
     metrics = {row.metric: row.value for row in RunFolder(out).read_rows() if row.role == "external"}
     group = SceneRollOuts(scene, gap_samples=find_preset("smoke").gap_samples)
     group.roll_outs.append(RollOut(group, find_method("newton-4"), trajectory, suites=("speed",)))
-    values = measured(group.roll_outs[0])[0]
+    values = measure_roll_out(group.roll_outs[0])[0]
     values.pop("solver/relaxed_frames")  # which a file does not say
     expected = {
         name: value.value if isinstance(value, Estimate) else value for name, value in values.items()

@@ -10,7 +10,7 @@ import numba
 import numpy as np
 import pytest
 
-from benchmarks.timing import MOST, clocked
+from benchmarks.timing import MOST, time_run
 
 
 def positions_of(made):
@@ -31,7 +31,7 @@ def test_what_is_made_only_when_it_is_looked_at_is_made_on_the_clock():
             work(0.1)
             return np.zeros((2, 3, 3))
 
-    assert clocked(Lazy, read=positions_of)[1].seconds >= 0.1
+    assert time_run(Lazy, read=positions_of)[1].seconds >= 0.1
 
 
 def test_short_work_is_done_again_until_enough_is_measured_and_long_work_once():
@@ -40,12 +40,12 @@ def test_short_work_is_done_again_until_enough_is_measured_and_long_work_once():
         return np.zeros((2, 3, 3))
 
     # A busy machine takes the processor away for some 0.1 s: far less than what is asked for.
-    _, reading = clocked(run, read=positions_of, min_time=0.4)
+    _, reading = time_run(run, read=positions_of, min_time=0.4)
     assert len(reading.runs) > 1 and reading.complaint == ""
     assert sum(reading.runs[:-1]) < 0.4 <= sum(reading.runs)
     assert reading.seconds == sorted(reading.runs)[len(reading.runs) // 2] or len(reading.runs) % 2 == 0
-    assert len(clocked(run, read=positions_of)[1].runs) == 1
-    _, reading = clocked(lambda: np.zeros(1), read=positions_of, min_time=60.0)
+    assert len(time_run(run, read=positions_of)[1].runs) == 1
+    _, reading = time_run(lambda: np.zeros(1), read=positions_of, min_time=60.0)
     assert len(reading.runs) == MOST
 
 
@@ -59,16 +59,16 @@ def test_a_first_run_that_compiles_is_no_measurement(always):
         calls.append(kernels[-1](1.0))
         return np.zeros((2, 3, 3))
 
-    _, reading = clocked(run, read=positions_of)
+    _, reading = time_run(run, read=positions_of)
     assert len(calls) == 2 and len(reading.runs) == 1  # whoever compiles in each run is measured so
     assert (reading.seconds < 0.005) is not always and reading.complaint == ""  # compiling takes 20 ms
 
 
 def test_an_answer_that_was_kept_from_the_first_run_is_found():
     kept = np.zeros((2, 3, 3))
-    _, reading = clocked(lambda: kept[:], read=positions_of, min_time=1.0)
+    _, reading = time_run(lambda: kept[:], read=positions_of, min_time=1.0)
     assert "what it had given before" in reading.complaint and len(reading.runs) == 2
-    assert clocked(lambda: kept, read=positions_of)[1].complaint == ""
+    assert time_run(lambda: kept, read=positions_of)[1].complaint == ""
 
 
 @pytest.mark.parametrize("pause", [0.0, 0.01])
@@ -84,7 +84,7 @@ def test_a_thread_that_only_computes_or_only_waits_is_found_too(pause):
         threading.Thread(target=go_on, name="behind", daemon=True).start()
         return np.zeros((2, 3, 3))
 
-    _, reading = clocked(run, read=positions_of)
+    _, reading = time_run(run, read=positions_of)
     stop.set()
     assert "at work" in reading.complaint or "behind was still running" in reading.complaint
 
@@ -96,7 +96,7 @@ def test_a_process_that_goes_on_is_found():
         process.start()
         return np.zeros((2, 3, 3))
 
-    _, reading = clocked(run, read=positions_of)
+    _, reading = time_run(run, read=positions_of)
     process.kill()
     process.join()
     assert "outside was still running" in reading.complaint
@@ -110,5 +110,5 @@ def test_more_than_one_thread_at_work_is_found(monkeypatch):
         time.sleep(0.2)
         return np.zeros((2, 3, 3))
 
-    _, reading = clocked(run, read=positions_of)
+    _, reading = time_run(run, read=positions_of)
     assert "more than one thread" in reading.complaint

@@ -88,7 +88,7 @@ FAULTS = (
           "step.previous - step.dt * step.velocity", fast=("free_fall",)),
     Fault("pins jump in the first sub-step", "TimeStepper.advance",
           "handles = (1 - share) * handles + share * pins", "handles = pins"),
-    Fault("an obstacle moves on as fast in sub-steps", "Obstacle.refined",
+    Fault("an obstacle moves on as fast in sub-steps", "Obstacle.refine",
           "fine._substeps = self._substeps * substeps", "fine._substeps = self._substeps"),
     Fault("velocity over the square of dt", "TimeStepper.advance", "(y - x) / self.dt",
           "(y - x) / self.dt**2"),
@@ -143,7 +143,7 @@ FAULTS = (
           "history.add(alpha * p, self.g - g)", "history.add(alpha * p, self.g)"),
     Fault("block transposed in the sparse matrix", "_block_keys", "key = column * n + row",
           "key = row * n + column"),
-    Fault("lower half only", "HessianPattern.symmetric", "lower + sp.tril(lower, -1).T", "lower"),
+    Fault("lower half only", "HessianPattern.symmetrise", "lower + sp.tril(lower, -1).T", "lower"),
     # the metric that judges
     Fault("curvature over 2 A", "mean_curvature", "np.divide(norm, 4.0 * area", "np.divide(norm, 2.0 * area"),
     Fault("barycentric cells at half weight", "mean_curvature", "weighted) / 8.0", "weighted) / 6.0"),

@@ -15,7 +15,7 @@ METRIC_FAULTS = {
               "potential.value(start)"),
         Fault("gap to the minimum below", "optimality", "append(energy - best)",
               "append(energy - minimum.energy)"),
-        Fault("warm-up judged", "_judged", "range(scene.warm_up, len(", "range(2, len("),
+        Fault("warm-up judged", "_pick_frames", "range(scene.warm_up, len(", "range(2, len("),
         Fault("areas of the frame instead of the minimum", "_curvature_error",
               "ours, _ = mean_curvature(x, faces)\n    theirs, areas = mean_curvature(y, faces)",
               "ours, areas = mean_curvature(x, faces)\n    theirs, _ = mean_curvature(y, faces)"),
@@ -26,7 +26,7 @@ METRIC_FAULTS = {
         Fault("planes not searched again", "optimality", "positions, frame, guess=x)", "positions, frame)"),
     ),
     "test_friction": (
-        Fault("terms copied one by one", "copied_terms",
+        Fault("terms copied one by one", "copy_terms",
               "vars(twin).update({name: twins[id(v)] for name, v in vars(twin).items() if id(v) in twins})",
               "pass"),
         Fault("the step before not prepared", "freeze_step", "if frame > 1 and", "if frame < 0 and"),
@@ -58,7 +58,7 @@ METRIC_FAULTS = {
     "test_swept_crossings": (
         Fault("near is through", "swept_crossings", "conservative_rescaling=1.0",
               "conservative_rescaling=0.8"),
-        Fault("planes at the ends alone", "coplanar_on_the_way",
+        Fault("planes at the ends alone", "find_coplanar",
               "coefficients.min(axis=0), coefficients.max(axis=0)",
               "coefficients[[0, 3]].min(axis=0), coefficients[[0, 3]].max(axis=0)"),
         Fault("one frame twice", "measure_swept", "swept_crossings(x[step], x[step + 1]",

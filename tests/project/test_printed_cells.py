@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from benchmarks.assets import embedded_motions, open_assets
+from benchmarks.assets import make_motions, open_assets
 from benchmarks.methods.networks import Network
 from benchmarks.metrics.energy import energy_series
 from benchmarks.presets import find_preset
@@ -30,7 +30,7 @@ def rows():
 def test_a_network_of_the_package_has_the_published_and_the_shipped_energies(motion, rows):
     shipped = json.loads(str(read_arrays(FOLDER / f"tshirt-{motion}.npz")["facts"]))["metrics"]
     preset = find_preset("quick")
-    assets = open_assets(preset, embedded_motions([motion]), ["tshirt"])
+    assets = open_assets(preset, make_motions([motion]), ["tshirt"])
     scene = GARMENT_SCENES[0].scene(motion).at(preset).build(assets)
     for name in (*TRAINED, "supervised"):
         network = Network(f"{name}-tshirt")

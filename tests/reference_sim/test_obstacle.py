@@ -119,7 +119,7 @@ def test_each_frame_has_its_own_surface_and_the_last_one_stays():
     for ask in (obstacle.signed_distance, Obstacle(moving, FACES).planes):
         with pytest.raises(ValueError, match="frames count from 0"):
             ask(point, -1)
-    np.testing.assert_allclose(Obstacle(moving, FACES).transported(point, 0), point, atol=1e-12)
+    np.testing.assert_allclose(Obstacle(moving, FACES).transport(point, 0), point, atol=1e-12)
 
 
 def test_carried_is_exact_for_a_rigid_motion():
@@ -127,7 +127,7 @@ def test_carried_is_exact_for_a_rigid_motion():
     obstacle = Obstacle(np.stack([SPHERE, SPHERE @ turn.T + shift]), FACES)
     points, _ = around(200, 6, -0.1, 0.3)
     # Round-off of barycentric places and frames, at 1 m from the origin.
-    for carried in (obstacle.transported(points, 1), obstacle.carrying(points)(1)):
+    for carried in (obstacle.transport(points, 1), obstacle.carrying(points)(1)):
         assert carried == pytest.approx(points @ turn.T + shift, abs=1e-12)
 
 

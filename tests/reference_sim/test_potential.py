@@ -56,9 +56,9 @@ def test_the_pattern_of_free_vertices_is_a_part_of_the_whole(pins):
     data = pattern.assemble(x)
     assert len(pattern.indptr) == rows.sum() + 1
     # Sums of the same numbers in another order, after autodiff's own round-off.
-    assert np.abs(pattern.symmetric(data).toarray() - expected).max() < 1e-12 * np.abs(expected).max()
+    assert np.abs(pattern.symmetrise(data).toarray() - expected).max() < 1e-12 * np.abs(expected).max()
     if not pins:
-        assert (potential.hessian(x) != pattern.symmetric(data)).nnz == 0
+        assert (potential.hessian(x) != pattern.symmetrise(data)).nnz == 0
     assert data[pattern.diagonal] == pytest.approx(expected.diagonal(), rel=1e-12)
     assert sorted(pattern.order.tolist()) == list(range(rows.sum()))
     # CSC as a factorisation reads it: rows of a column in order, the diagonal stored.
@@ -79,7 +79,7 @@ def test_the_scalar_pattern_is_the_sum_of_scalar_stiffnesses():
                 np.add.at(expected, np.ix_(stencil, stencil), block)
     expected = expected[np.ix_(cloth.free, cloth.free)]
     assert np.linalg.eigvalsh(expected)[0] > 0  # what a preconditioner must be
-    assembled = pattern.symmetric(pattern.assemble(x)).toarray()
+    assembled = pattern.symmetrise(pattern.assemble(x)).toarray()
     assert np.abs(assembled - expected).max() < 1e-13 * np.abs(expected).max()
 
 

@@ -289,7 +289,7 @@ def test_a_run_says_whether_it_agrees_with_the_published_one_of_its_study(tmp_pa
     again = [given for given in a_run(1) if given.seed == 0]
 
     def line(rows: list[Row], name: str = "mine") -> str:
-        return command.against_published(run_of(rows, study={"name": name}), tmp_path)
+        return command.compare_published(run_of(rows, study={"name": name}), tmp_path)
 
     odd = [times(3.0, scene=SCENES[0], **STRAIN)(given) for given in again]
     assert line(again).startswith("published: reproduced (") and line(again, "other") == ""

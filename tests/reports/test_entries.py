@@ -10,7 +10,7 @@ import pytest
 from benchmarks.provenance import digest_of_file
 from benchmarks.results.row import DECLARED, ResultsError
 from benchmarks.results.run_folder import RunFolder
-from reports.entries import entries_tables, full_scenes, of_entry, page_of
+from reports.entries import entries_tables, full_scenes, load_entry, page_of
 from reports.finished_run import read_run
 from tests.reports.report_folder import row, run_folder
 
@@ -56,7 +56,7 @@ def test_a_table_has_one_protocol_and_one_set_of_scenes_and_is_sorted(tmp_path, 
         write_entry(tmp_path / "in", "old", 1.0, protocol="0.9"),
     ]
     assert full_scenes(published) == FULL
-    tables = [table for table, _ in entries_tables([*map(of_entry, made)], "quick", published)]
+    tables = [table for table, _ in entries_tables([*map(load_entry, made)], "quick", published)]
     assert {table.caption: [line[1].split()[0] for line in table.rows] for table in tables} == {
         "Protocol 0.9; scenes: all.": ["old"],
         "Protocol 1.0; scenes: all.": ["better", "SNUG", "worse", "Skinning"],
@@ -88,11 +88,11 @@ def test_scores_of_files_as_they_were_scored_are_marked_by_who_made_them(tmp_pat
         url = {"url": "https://example.org/mine"}
         scores.write_config(config | {"metadata": config["metadata"] | url | {"program": program}})
         (scores.path / "picture.png").write_bytes(b"png")
-        cells, title = of_entry(folder).cells(), of_entry(folder).title_cell()
+        cells, title = load_entry(folder).cells(), load_entry(folder).title_cell()
         assert cells[8:11] == (proof, "abc", "2026-11-29") and len(cells[11]) == 8
         assert title[4:] == ["https://example.org/mine", "data:image/png;base64,cG5n"]
     (folder / "x.npz").write_text("other frames")
-    assert of_entry(folder).cells()[8] == "declared"
+    assert load_entry(folder).cells()[8] == "declared"
 
 
 def test_scores_of_another_entry_or_of_none_are_refused_with_what_to_do(tmp_path, published):

@@ -15,7 +15,7 @@ from reference_sim.files.mesh_files import read_mesh
 from reference_sim.trajectory import read_point_cache
 from reports import film, pictures
 from reports.finished_run import read_run
-from reports.pictures import Camera, camera_axes, side_by_side, worst_frame
+from reports.pictures import Camera, camera_axes, draw_methods, worst_frame
 from tests.reports.report_folder import FRAMES, row, run_folder, sheet, write_mesh
 
 SCENE = "tshirt/walk"
@@ -37,7 +37,7 @@ def run(tmp_path_factory) -> RunFolder:
 
 
 def test_the_still_has_what_came_to_its_end_at_the_liveliest_frame(run):
-    drawing = side_by_side(read_run(run))
+    drawing = draw_methods(read_run(run))
     assert drawing.caption.startswith("tshirt: walk: frame 3, where ")
     assert drawing.canvas.get_figwidth() == pytest.approx(2 * pictures.WIDEST, abs=0.1)
 
@@ -61,7 +61,7 @@ def test_a_view_shows_the_nearer_surface_and_what_lies_behind_around_it():
     assert image.shape == (60, 60, 3) and image[0, 0].min() == 1.0  # white around
     assert image[30, 30, 0] > 0.3 > image[30, 30, 2] and other[30, 30, 2] > 0.3 > other[30, 30, 1]
     # A corner of the mesh comes to where the camera says that it is.
-    x, y, _ = camera.seen(cloth[0])[0]
+    x, y, _ = camera.project(cloth[0])[0]
     column, line = int(30 + 60 * x / camera.height), int(30 - 60 * y / camera.height)
     assert image[line - 2, column + 2].max() < 1.0 or image[line - 2, column + 2, 2] < 0.9
 
@@ -117,7 +117,7 @@ def test_a_roll_out_that_ended_early_says_so_and_keeps_its_last_frame(run):
     ended = [bool((frame[foot, 100:] == film.INK[0]).any()) for frame in frames]
     assert ended == [False] * 3 + [True] * 2
     cloth = selected.series["snug"]
-    assert np.array_equal(cloth.positions[-1], pictures.drawn(cloth, 4, (0.0, 0.0, 0.0)).positions)
+    assert np.array_equal(cloth.positions[-1], pictures.freeze(cloth, 4, (0.0, 0.0, 0.0)).positions)
 
 
 def test_point_caches_of_garment_and_body_have_their_meshes_beside_them(run, tmp_path):

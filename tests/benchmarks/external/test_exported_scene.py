@@ -21,7 +21,7 @@ from benchmarks.methods.outside import entry_of
 from benchmarks.metric import RollOut, SceneRollOuts
 from benchmarks.metrics.curvature import curvature_series
 from benchmarks.metrics.energy import energy_series
-from benchmarks.runner.measurements import measured
+from benchmarks.runner.measurements import measure_roll_out
 from benchmarks.scene import Dressed
 from reference_sim import Trajectory
 from reference_sim.files.mesh_files import read_mesh
@@ -83,7 +83,11 @@ def rows_beside(scene, entry) -> dict:
         group.roll_outs.append(
             RollOut(group, one, made, suites=("garments",), quasi_static=static_answer)
         )
-    return {name: value for name, value in measured(group.roll_outs[1])[0].items() if not np.isnan(value)}
+    return {
+        name: value
+        for name, value in measure_roll_out(group.roll_outs[1])[0].items()
+        if not np.isnan(value)
+    }
 
 
 def test_skinning_made_elsewhere_and_scored_gives_the_numbers_of_the_method(home, tmp_path):

@@ -21,8 +21,8 @@ from benchmarks.methods.outside import entry_of
 from benchmarks.metric import Estimate, RollOut
 from benchmarks.plan.study import option, read_study
 from benchmarks.runner.cells import judge
-from benchmarks.runner.measurements import measured
-from benchmarks.scenes.from_roll_out import declared
+from benchmarks.runner.measurements import measure_roll_out
+from benchmarks.scenes.from_roll_out import declare_scene
 from benchmarks.timing import Reading
 from reference_sim import Trajectory
 from reference_sim.trajectory import (
@@ -82,12 +82,12 @@ def rows(path: str, **stated) -> dict:
     method, entry = stored(path, **stated)
     group = grouped(SCENE, {})
     group.roll_outs.append(RollOut(group, entry, method.run(), suites=("speed",)))
-    return measured(group.roll_outs[0])[0]
+    return measure_roll_out(group.roll_outs[0])[0]
 
 
 def direct(positions: np.ndarray) -> dict:
     """The numbers of positions that were in no file."""
-    return measured(grouped(SCENE, {"skinning": positions}, suites=("speed",)).roll_outs[0])[0]
+    return measure_roll_out(grouped(SCENE, {"skinning": positions}, suites=("speed",)).roll_outs[0])[0]
 
 
 @pytest.mark.parametrize("kind", ["vtkhdf", "npz", "pkl", "obj"])
@@ -173,7 +173,7 @@ def test_another_mesh_of_the_same_surface_is_compared_as_a_surface_alone(tmp_pat
     for other_mesh, status in ((True, "ok"), (False, "failed")):
         assert judge(trajectory, Reading(0.0), SCENE, truncated=False, other_mesh=other_mesh)[0] == status
     group = grouped(SCENE, {"simulation": X})
-    metrics = measured(RollOut(group, entry, trajectory, suites=("speed",)))[0]
+    metrics = measure_roll_out(RollOut(group, entry, trajectory, suites=("speed",)))[0]
     assert set(metrics) == {"surface/chamfer", "surface/normals"} and metrics["surface/chamfer"] < 1e-9
 
 
@@ -219,7 +219,7 @@ def declare(folder: Path, rest_scale: float):
     )  # fmt: skip
     write_obj(folder / "rest.obj", rest_scale * SCENE.cloth.rest_positions, FACES)
     option = RollOutOption("pred", str(folder / "pred.npz"))
-    return declared(option, str(folder / "rest.obj"))
+    return declare_scene(option, str(folder / "rest.obj"))
 
 
 @pytest.mark.parametrize("rest_scale", [100.0, 0.01])

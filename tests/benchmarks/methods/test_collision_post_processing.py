@@ -16,8 +16,8 @@ def scene():
     body = dressed.body
     skin = body.vertices(motion.poses, motion.translations)
     clean = CollisionPostProcessing(dressed, skin)
-    obstacle = Obstacle(skin, body.faces, rest_positions=body.shaped())
-    return clean, obstacle, dressed.skinned(motion, smoothing=20)
+    obstacle = Obstacle(skin, body.faces, rest_positions=body.rest_vertices())
+    return clean, obstacle, dressed.skin(motion, smoothing=20)
 
 
 def test_what_lies_below_the_skin_comes_out_to_two_millimetres_and_all_else_stays(scene):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from benchmarks import timing
-from benchmarks.assets import embedded_motions, open_assets
+from benchmarks.assets import make_motions, open_assets
 from benchmarks.method import Method
 from benchmarks.methods import find_method
 from benchmarks.methods.declared_solvers import SOLVERS
@@ -23,7 +23,7 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.cells import build_scene
 from benchmarks.runner.loop import Runner
-from benchmarks.runner.measurements import measured
+from benchmarks.runner.measurements import measure_roll_out
 from benchmarks.runner.rows import rows_of
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.scenes import SCENES
@@ -82,7 +82,7 @@ def run(tmp_path_factory):
         if scene.name == "hanging_sheet" or runs_in(entry, scene.name)
     )
     plan = plan_of(folder.path, preset=TINY, cells=cells, motions=Motions((TRAIN,), (TEST,)))
-    assets = open_assets(TINY, embedded_motions([TRAIN, TEST]), ["tshirt"])
+    assets = open_assets(TINY, make_motions([TRAIN, TEST]), ["tshirt"])
     runner = Runner(tasks_of(plan), Cache(folder))
     executor = InProcess(folder, assets)
     with pytest.MonkeyPatch.context() as patch:
@@ -243,7 +243,7 @@ def test_a_roll_out_that_is_lost_is_measured_up_to_there_and_ends_no_other_ones_
     for roll_out in group.roll_outs[1:]:
         roll_out.status = "diverged"
     with np.errstate(all="ignore"):
-        metrics, curves, _ = zip(*(measured(roll_out) for roll_out in group.roll_outs))
+        metrics, curves, _ = zip(*(measure_roll_out(roll_out) for roll_out in group.roll_outs))
     metrics, curves = dict(zip(lost, metrics)), dict(zip(lost, curves))
     plain = {m: {n: getattr(v, "value", v) for n, v in values.items()} for m, values in metrics.items()}
     assert np.isfinite(list(plain["simulation"].values())).all() and metrics["newton-4"] == {}

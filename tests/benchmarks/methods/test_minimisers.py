@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks.meshes import square_sheet
 from benchmarks.methods.sweeps import XPBD, VertexBlockDescent, block
-from benchmarks.methods.warm_started import SHARE, given_frames
+from benchmarks.methods.warm_started import SHARE, make_guess
 from benchmarks.metrics.energy import first_guess
 from benchmarks.scenes.sheets import exact_fall
 from reference_sim import Cloth, Material, Potential, simulate
@@ -32,7 +32,7 @@ def test_the_block_of_a_vertex_is_that_of_the_potential(touching):
     assert potential.terms(x)["collision"] > 0.0
     inertia, terms = VertexBlockDescent(potential, max_iterations=1).freeze()
     pattern = potential.pattern(np.ones(len(x), dtype=bool))
-    convex = pattern.symmetric(pattern.assemble(x, convexity=1.0)).toarray()
+    convex = pattern.symmetrise(pattern.assemble(x, convexity=1.0)).toarray()
     gradient = potential.gradient(x)
     g, H = np.empty(3), np.empty((3, 3))
     for v in range(len(x)):
@@ -141,10 +141,10 @@ def test_given_frames_begin_anew_with_each_run_and_carry_what_the_solver_added_t
     added = np.random.default_rng(1).normal(size=(2, 5, 3))
 
     class Turning:
-        def carried(self, residual, frame):
+        def carry(self, residual, frame):
             return frame * residual[:, ::-1]
 
-    plain, carrying = given_frames(lambda: iter(frames)), given_frames(lambda: iter(frames), Turning())
+    plain, carrying = make_guess(lambda: iter(frames)), make_guess(lambda: iter(frames), Turning())
     for _ in range(2):
         for step in (1, 2):
             x = frames[step - 1] + added[step - 1]

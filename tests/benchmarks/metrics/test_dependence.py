@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.assets import Assets
 from benchmarks.presets import Dependence, find_preset
-from benchmarks.runner.measurements import measured
+from benchmarks.runner.measurements import measure_roll_out
 from benchmarks.scenes import find_scene
 from snug.body.parametric_body import Body
 from tests.benchmarks.runner.tasks_by_hand import grouped, prepared
@@ -35,7 +35,7 @@ def test_each_mesh_and_time_step_is_measured_the_same_way(assets):
         scene = built(name, assets)
         made = {method: prepared(method, scene).run().positions for method in METHODS}
         for roll_out in grouped(scene, made, suites=("validation",)).roll_outs:
-            metrics = measured(roll_out, find_scene(name).metrics)[0]
+            metrics = measure_roll_out(roll_out, find_scene(name).metrics)[0]
             value |= {(name, roll_out.entry.name, metric): number for metric, number in metrics.items()}
     for name in SCENES:
         assert abs(value[name, "simulation", "mesh/vertices"] - 200) < 40

@@ -136,7 +136,7 @@ def test_the_hem_of_a_garment_with_legs_is_both_cuffs():
     dressed, motion = tube_dress(), swaying(40)
     left, right = np.array_split(np.arange(AROUND), 2)
     garment = replace(dressed.garment, loops={"left_leg": left, "right_leg": right})
-    still = dressed.skinned(motion)
+    still = dressed.skin(motion)
     swing = 0.02 * np.sin(2 * np.pi * np.arange(40) / 15)[:, None, None] * still[:1]
     scene = BuiltScene(
         name="legs", cloth=garment.cloth(), energies=(), dt=1 / 30, frames=40, settle=lambda: still[0],

@@ -33,7 +33,7 @@ def found_of(scene, x):
 @pytest.mark.parametrize("frames", [5, 77])
 def test_the_last_hundred_frames_show_the_motion_of_the_first(frames):
     motion = swaying(frames)
-    long = hard_motions.repeated_there_and_back(motion)
+    long = hard_motions.repeat_both_ways(motion)
     assert FRAMES <= long.frames < FRAMES + 2 * frames
     assert np.array_equal(long.poses[-ENDS:], long.poses[:ENDS])
     assert np.array_equal(long.translations[-ENDS:], long.translations[:ENDS])
@@ -43,7 +43,7 @@ def test_the_last_hundred_frames_show_the_motion_of_the_first(frames):
 
 def test_a_loop_comes_back_to_its_pose_and_goes_on_over_the_ground():
     walk = make_motion("walk")
-    motion, early, late = hard_motions.looped(walk, 1000)
+    motion, early, late = hard_motions.repeat_walk(walk, 1000)
     loop = walk.frames + LOOP_BLEND
     assert motion.frames == 1000 and len(early) == len(late) == loop and early[0] == loop
     for frames in (early, late):
@@ -59,12 +59,12 @@ def test_the_long_roll_out_is_the_short_one_carried_on_and_only_some_frames_are_
     scene, model = long_scene(dressed), untrained_model("snug", dressed, [walk], seed=0)
     model.save(model_path(tmp_path, "snug", 0))
     x = prepared("snug", scene, tmp_path).run().positions
-    motion, early, late = hard_motions.looped(walk, SMOKE.loop_frames)
+    motion, early, late = hard_motions.repeat_walk(walk, SMOKE.loop_frames)
     assert set(scene.kept) == {*range(0, SMOKE.loop_frames, EVERY), *early, *late}
     whole = roll_out(model, dressed, motion).positions
     assert np.array_equal(x, whole[scene.kept])
     assert [scene.kept[places].tolist() for places in scene.repeated] == [early.tolist(), late.tolist()]
-    bare = dressed.skinned(motion, smoothing=20)
+    bare = dressed.skin(motion, smoothing=20)
     assert scene.skinned == pytest.approx(bare[scene.kept], abs=1e-12)
     # The state of an untrained network is soon forgotten.
     assert 0.0 < found_of(scene, x)["roll_out/drift"] < 1.0

@@ -160,7 +160,7 @@ def test_a_body_in_itself_is_counted_by_its_vertices_in_its_other_parts():
 def test_the_worst_frame_is_found_beyond_what_is_so_at_rest_and_in_the_references_rows_alone():
     faces = two_spheres(1.5)[1]
     obstacle = Obstacle(np.stack([two_spheres(apart)[0] for apart in (0.2, 1.5, 0.5, 1.0)]), faces)
-    body = SimpleNamespace(shaped=lambda betas: two_spheres(1.5)[0])
+    body = SimpleNamespace(rest_vertices=lambda betas: two_spheres(1.5)[0])
     scene = SimpleNamespace(obstacle=obstacle, dressed=SimpleNamespace(body=body, betas=None), warm_up=1)
     entry = SimpleNamespace(role="reference")
     roll_out = SimpleNamespace(scene=scene, positions=np.zeros((4, 1, 3)), entry=entry)

@@ -7,13 +7,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks.assets import embedded_motions, open_assets
+from benchmarks.assets import make_motions, open_assets
 from benchmarks.methods import find_method
 from benchmarks.methods.own_energies import (
     OWN_REFERENCES,
     STATIC,
-    own_energies,
-    own_reference,
+    find_energies,
+    find_own_reference,
 )
 from benchmarks.methods.simulation import STATIC as AT_REST
 from benchmarks.methods.simulation import Simulation
@@ -29,7 +29,7 @@ MOTION = "arm_raise"
 @pytest.fixture(scope="module")
 def scene():
     sizes = dataclasses.replace(find_preset("smoke"), frames=8, settle_frames=8, garment_vertices=300)
-    assets = open_assets(sizes, embedded_motions([MOTION]), ["tshirt"])
+    assets = open_assets(sizes, make_motions([MOTION]), ["tshirt"])
     built = dressed_scene(MOTION, preset=sizes).build(assets)
     start = built.start_state
     return dataclasses.replace(built, settle=lambda: start)
@@ -63,8 +63,8 @@ def excess(scene, simulations, name, positions):
 )
 def test_the_minimiser_of_its_own_energies_leaves_a_network_no_excess(scene, simulations, name):
     entry = find_method(name)
-    reference = own_reference(entry)
-    usual = "at rest" if own_energies(entry) == STATIC else "simulation"
+    reference = find_own_reference(entry)
+    usual = "at rest" if find_energies(entry) == STATIC else "simulation"
     best = simulations[reference.name if reference else usual]
     own, common = excess(scene, simulations, name, best)
     assert own == pytest.approx(0.0, abs=1e-9)
@@ -91,14 +91,14 @@ def test_simulations_have_the_constants_that_are_trained_on(scene):
 
 @pytest.mark.parametrize("name", ["supervised", "snug-no-strain", "snug-no-collision"])
 def test_what_has_no_minimum_or_learned_vertices_has_no_own_excess(scene, simulations, name):
-    assert own_energies(find_method(name)) is None and own_reference(find_method(name)) is None
+    assert find_energies(find_method(name)) is None and find_own_reference(find_method(name)) is None
     group = grouped(scene, {"simulation": simulations["simulation"], name: simulations["simulation"]})
     assert measure(group.roll_outs[1]) == compare(group.roll_outs[1], group.reference) == {}
 
 
 def test_solvers_and_networks_of_the_scenes_energies_need_no_further_simulation():
     for name in ("newton-1", "snug+newton-1", "snug", "skinning", "handles-80", "ncs"):
-        assert own_reference(find_method(name)) is None, name
+        assert find_own_reference(find_method(name)) is None, name
 
 
 def test_a_kind_is_static_where_its_network_carries_no_state():

@@ -10,7 +10,7 @@ import pytest
 
 from benchmarks.meshes import in_space, random_rotation, right_grid
 from benchmarks.metrics import intersections as module
-from benchmarks.metrics.intersections import coplanar_on_the_way, measure_swept, swept_crossings
+from benchmarks.metrics.intersections import find_coplanar, measure_swept, swept_crossings
 from benchmarks.metrics.self_intersections import self_intersections
 
 FACES = np.array([[0, 1, 2], [3, 4, 5]])
@@ -67,7 +67,7 @@ def test_a_cloth_that_has_fallen_apart_is_left_out(monkeypatch):
 def test_what_ipctk_finds_to_meet_may_be_in_one_plane():
     points = np.random.default_rng(0).normal(size=(2, 600, 4, 3))
     test = ipctk.TightInclusionCCD(conservative_rescaling=1.0)
-    maybe = coplanar_on_the_way(*points)
+    maybe = find_coplanar(*points)
     for ask in (test.point_triangle_ccd, test.edge_edge_ccd):
         meet = np.array([ask(*a, *b)[0] for a, b in zip(*points)])
         assert meet.sum() > 20 and not (meet & ~maybe).any()

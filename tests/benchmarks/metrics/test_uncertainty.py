@@ -13,7 +13,7 @@ from benchmarks.metrics import penetration_and_distances as geometry
 from benchmarks.metrics.dynamics import HemMotion
 from benchmarks.results.protocol import FAMILY, STARTS, noise, trend
 from benchmarks.results.row import Row
-from benchmarks.runner.measurements import compared, measured
+from benchmarks.runner.measurements import compare_family, measure_roll_out
 from benchmarks.runner.rows import with_uncertainty
 from tests.benchmarks.runner.tasks_by_hand import grouped, prepared, small_scene
 
@@ -34,17 +34,17 @@ def test_the_uncertainty_of_a_distance_is_what_another_right_simulation_changes(
         "simulation-perturbed-1e-9": 0.3, "newton-1": 0.01,
     }  # fmt: skip
     group = grouped(scene, {name: x + shift * EAST for name, shift in shifts.items()})
-    metrics = compared(group.roll_outs[-1], geometry.compare)
+    metrics = compare_family(group.roll_outs[-1], geometry.compare)
     value, uncertainty, moved = metrics["distance/rms"]
     assert (value, uncertainty) == pytest.approx((10.0, 4.0 / 2.0**0.5))  # a smaller step is no noise
     assert dict(moved) == pytest.approx({TWIN: 4.0, SMALLER: -2.0})
     # A member is compared with the others, not with itself.
-    value, uncertainty, moved = compared(group.roll_outs[1], geometry.compare)["distance/rms"]
+    value, uncertainty, moved = compare_family(group.roll_outs[1], geometry.compare)["distance/rms"]
     assert value == pytest.approx(4.0) and np.isnan(uncertainty)
     assert dict(moved) == pytest.approx({SMALLER: 2.0})
-    assert compared(group.roll_outs[0], geometry.compare) == {}
+    assert compare_family(group.roll_outs[0], geometry.compare) == {}
     alone = grouped(scene, {"simulation": x, "newton-1": x + 0.01 * EAST})
-    assert compared(alone.roll_outs[1], geometry.compare)["distance/rms"] == pytest.approx(10.0)
+    assert compare_family(alone.roll_outs[1], geometry.compare)["distance/rms"] == pytest.approx(10.0)
 
 
 def test_the_family_has_two_starts_of_each_time_step():
@@ -109,7 +109,7 @@ def test_means_are_over_the_judged_frames_alone():
     assert strains[1] > 2.0 * strains[0]
     # What ended in the warm-up has no number.
     ended = grouped(scene, {"newton-1": x[:3]}, suites=("garments",)).roll_outs[0]
-    assert measured(ended) == ({}, {}, ("ok", ""))
+    assert measure_roll_out(ended) == ({}, {}, ("ok", ""))
 
 
 def test_dynamics_are_told_by_the_own_static_answer_and_by_the_simulators(monkeypatch):

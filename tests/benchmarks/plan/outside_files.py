@@ -114,5 +114,5 @@ def as_before():
         file = getattr(sys.modules[name], "__file__", None) or ""
         if not file.startswith((str(Path(run.__file__).parent.parent), sys.prefix, sys.base_prefix)):
             del sys.modules[name]
-    metrics.declared.cache_clear()
+    metrics.list_metrics.cache_clear()
     forget()

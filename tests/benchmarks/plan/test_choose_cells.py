@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from benchmarks.metrics import measured_in
-from benchmarks.plan.choose_cells import expanded, matching
+from benchmarks.metrics import pick_measured
+from benchmarks.plan.choose_cells import expand, matching
 from benchmarks.plan.motions import Motions, split_motions
 from benchmarks.plan.plan import make_plan
 from benchmarks.plan.study import StudyError, read_study
@@ -38,7 +38,7 @@ def test_of_whole_motions_the_first_alone_is_timed_and_all_else_is_measured_in_a
     scenes = {cell.scene.name: cell.scene for cell in planned("full:garments,speed", *TESTS).cells}
     assert scenes["tshirt/kick"].timed and not scenes["tshirt/punch"].timed
     assert scenes["tshirt/kick@clip"].timed and scenes["hanging_sheet"].timed
-    left_out = {*measured_in(None)} - {*measured_in(scenes["tshirt/punch"].metrics)}
+    left_out = {*pick_measured(None)} - {*pick_measured(scenes["tshirt/punch"].metrics)}
     assert [measurements.name for measurements in left_out] == ["cost"]
     assert scenes["tshirt/punch"].dynamic
 
@@ -69,10 +69,10 @@ def test_patterns_choose_scenes_methods_and_cases():
 
 def test_places_of_a_pattern_are_filled_by_motions_of_the_split():
     motions = Motions(("walk",), ("kick", "punch"), garments=GARMENT_SCENES[:3])
-    names = expanded(["{garment}/{motion}", "tunic/{motion}", "tshirt/{motion 2}@clip", "flag"], motions)
+    names = expand(["{garment}/{motion}", "tunic/{motion}", "tshirt/{motion 2}@clip", "flag"], motions)
     swinging = [f"tunic/{motion}" for motion in DYNAMIC_TEST]
     assert names == ["tshirt/kick", "tshirt/punch", *swinging, "tshirt/punch@clip", "flag"]
-    assert expanded(["skirt/{swinging 1}", "skirt/{swinging 9}"], motions) == [f"skirt/{DYNAMIC_TEST[0]}"]
+    assert expand(["skirt/{swinging 1}", "skirt/{swinging 9}"], motions) == [f"skirt/{DYNAMIC_TEST[0]}"]
 
 
 @pytest.mark.parametrize(
@@ -81,7 +81,7 @@ def test_places_of_a_pattern_are_filled_by_motions_of_the_split():
 )
 def test_a_pattern_of_another_garment_means_its_motions_of_the_split(part, pattern, split):
     plan = planned(f"full:{part}", "--set", f"split={split}", "--scenes", pattern)
-    measured = plan.motions.measured_of(pattern.partition("/")[0])
+    measured = plan.motions.pick_motions(pattern.partition("/")[0])
     assert {scene.name for scene in plan.scenes} == {pattern.replace("*", motion) for motion in measured}
     assert len(measured) > 1
 
@@ -104,9 +104,9 @@ def test_motions_are_divided_as_help_says():
     library = divided()
     assert (library.train, library.validation, library.test) == (TRAIN, VALIDATION, TEST)
     assert library.files == () and library.measured == TEST[:8]
-    assert library.measured_of("skirt") == DYNAMIC_TEST
+    assert library.pick_motions("skirt") == DYNAMIC_TEST
     moved = divided(test_motions=["walk", "kick"])
-    assert moved.measured_of("skirt") == moved.measured_of("dress") == moved.test
+    assert moved.pick_motions("skirt") == moved.pick_motions("dress") == moved.test
     assert moved.by_role("skirt")["validation"] == library.by_role("skirt")["validation"]
     assert set(moved.test) == {"walk", "kick"} and "kick" not in moved.validation
     assert not {"walk", *VALIDATION, *TEST} & set(moved.train)

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from benchmarks import run
-from benchmarks.plan.study import located, parse_setting, read_study, study_names
+from benchmarks.plan.study import locate, parse_setting, read_study, study_names
 from benchmarks.presets import find_preset
 from reports.blocks import FIGURES
 from tests.benchmarks.plan.planned import planned
@@ -102,5 +102,5 @@ def test_a_fault_of_no_field_of_the_file_gets_none_of_its_lines(tmp_path):
     path.write_text("# mine\n\nseeds = [0]\n\n[sizes]\n# small\nframes = 4\n")
     for field, line in (("seeds", 3), ("sizes.frames", 7), ("sizes.steps", 5), ("trained", 0)):
         place = f"{path}: line {line}: " * bool(line)
-        assert located(f"{field}: wrong", str(path), []) == f"{place}{field}: wrong"
-    assert located("seeds: wrong", str(path), ["--seeds", "1"]) == "seeds: wrong"
+        assert locate(f"{field}: wrong", str(path), []) == f"{place}{field}: wrong"
+    assert locate("seeds: wrong", str(path), ["--seeds", "1"]) == "seeds: wrong"

@@ -13,7 +13,7 @@ import pytest
 from benchmarks import run
 from benchmarks.method import MethodEntry, Training
 from benchmarks.methods.outside import program
-from benchmarks.methods.own_energies import own_energies, own_reference
+from benchmarks.methods.own_energies import find_energies, find_own_reference
 from benchmarks.plan import user_files
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
@@ -177,9 +177,9 @@ def test_own_energies_of_a_users_file_are_known_where_the_file_was_not_loaded(tm
         name="mine", description="", trained="mine", training=Training("snug", recipe), role="network",
         declared_in=str(home),
     )  # fmt: skip
-    assert own_energies(entry).terms == recipe.terms
-    reference = own_reference(entry)
-    assert reference.declared_in == str(home) and own_energies(reference) == own_energies(entry)
+    assert find_energies(entry).terms == recipe.terms
+    reference = find_own_reference(entry)
+    assert reference.declared_in == str(home) and find_energies(reference) == find_energies(entry)
     assert (reference.name, reference.options["contact_margin"]) == ("simulation-of-mine", 0.001)
 
 

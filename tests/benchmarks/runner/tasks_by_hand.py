@@ -26,7 +26,7 @@ from benchmarks.runner.networks import NetworkTraining
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.runner.task import Context, Outcome, failure
 from benchmarks.scene import BuiltScene
-from benchmarks.scenes import SCENES, of_garment
+from benchmarks.scenes import SCENES, find_garment
 from reference_sim import Trajectory, simulate
 
 TINY = dataclasses.replace(
@@ -52,7 +52,7 @@ def dressed_scene(
     motion: str, garment: str = "tshirt", *, part: str = "whole", preset: Preset | None = None
 ):
     """The declaration of a body in a garment."""
-    return of_garment(garment).scene(motion, part).at(preset or find_preset("smoke"))
+    return find_garment(garment).scene(motion, part).at(preset or find_preset("smoke"))
 
 
 def assets_of(dressed, motion) -> Assets:
@@ -159,7 +159,7 @@ class InProcess:
         except Exception as error:
             return failure(error)
 
-    def alone(self, task, needed):
+    def run_alone(self, task, needed):
         return self.outcome(task, self._named.setdefault(task.process, self.context()), needed)
 
     def release(self, process):

@@ -107,13 +107,13 @@ def test_repeats_take_turns_and_are_kept(tmp_path, monkeypatch):
     preset = dataclasses.replace(TINY, repeats=3, repeat_seconds=60.0)
     plan = plan_of(tmp_path, "simulation", "newton-1", "newton-4", preset=preset, how="still")
     calls: list = []
-    alone = InProcess.alone
+    alone = InProcess.run_alone
 
     def watched(self, task, needed):
         calls.append(task)
         return alone(self, task, needed)
 
-    monkeypatch.setattr(InProcess, "alone", watched)
+    monkeypatch.setattr(InProcess, "run_alone", watched)
     runner = finish(plan)
     repeats = [task.label.split(" x ")[1] for task in calls if task.kind == "repeat"]
     assert repeats == ["newton-1", "newton-4", "simulation", "newton-4", "simulation", "newton-1"]

@@ -68,7 +68,7 @@ def quickly(monkeypatch):
         asked.append(clip.name)
         return odd.get(clip.name, still)(clip, entry)
 
-    monkeypatch.setattr(ground_truth, "simulated", quick)
+    monkeypatch.setattr(ground_truth, "simulate_scene", quick)
     return odd, asked
 
 
@@ -150,10 +150,10 @@ def test_training_motions_are_simulated_and_written_once_all_are_whole(tmp_path,
             raise RuntimeError("no room")
         done.append(scene.dressed.motion.name)
         worn = scene.dressed
-        positions = DressedBody(worn.body, worn.garment).skinned(worn.motion)
+        positions = DressedBody(worn.body, worn.garment).skin(worn.motion)
         return Trajectory(positions, worn.garment.faces, np.arange(len(positions)) / 30)
 
-    monkeypatch.setattr(ground_truth, "simulated", draped)
+    monkeypatch.setattr(ground_truth, "simulate_scene", draped)
     monkeypatch.setattr(training_motions, "Executor", lambda run, assets, workers: InProcess(run, assets))
     out = tmp_path / "motions.h5"
     arguments = ["tshirt/training-motions", "--set", "sizes=smoke", "-o", str(out)]

@@ -17,9 +17,9 @@ from benchmarks.plan.motions import Motions
 from benchmarks.plan.plan import Network, Plan
 from benchmarks.results.row import BEFORE_FRAMES
 from benchmarks.results.run_folder import RunFolder
-from benchmarks.runner.networks import NetworkTraining, pretrained_network, put_into_package, take, train
+from benchmarks.runner.networks import NetworkTraining, find_pretrained, put_into_package, take, train
 from benchmarks.runner.rows import rows_of
-from benchmarks.runner.run_json import described
+from benchmarks.runner.run_json import describe_plan
 from benchmarks.runner.schedule import Schedule, tasks_of
 from benchmarks.runner.task import Outcome
 from snug.named_recipes import PBNS
@@ -68,7 +68,7 @@ def weights(path: Path) -> dict[str, torch.Tensor]:
 def test_a_file_takes_the_place_of_the_training_that_made_it(made, tmp_path):
     folder, outcome = made
     job = training_of(plan_with(tmp_path, "pbns"))
-    source, refusal = pretrained_network(job, folder)
+    source, refusal = find_pretrained(job, folder)
     assert source and not refusal
     done = take(job, source, context(tmp_path), {})
     tensors, other = (weights(job.path(RunFolder(place))) for place in (folder, tmp_path))
@@ -87,21 +87,21 @@ def test_a_file_takes_the_place_of_the_training_that_made_it(made, tmp_path):
     ],
 )
 def test_a_network_of_another_training_is_refused_and_says_in_what(made, tmp_path, changes, named):
-    _, refusal = pretrained_network(training_of(plan_with(tmp_path, "pbns", **changes)), made[0])
+    _, refusal = find_pretrained(training_of(plan_with(tmp_path, "pbns", **changes)), made[0])
     assert named in refusal and bool(refusal) == bool(named) and "\n" not in refusal
 
 
 def test_a_network_of_another_processor_is_taken_and_what_is_none_is_refused_in_one_line(made, tmp_path):
     job = training_of(plan_with(tmp_path, "pbns"))
     elsewhere = dataclasses.replace(job, inputs={**job.inputs, "machine": "another"}, key="another")
-    assert pretrained_network(elsewhere, made[0])[1] == ""
+    assert find_pretrained(elsewhere, made[0])[1] == ""
     none = "no pretrained network pbns-tshirt: benchmarks.run"
-    assert pretrained_network(job, tmp_path)[1].startswith(none)
+    assert find_pretrained(job, tmp_path)[1].startswith(none)
     path = tmp_path / "pbns-tshirt.safetensors"
     path.write_bytes(b"half")
-    assert "pbns-tshirt.safetensors: not a safetensors file" in pretrained_network(job, tmp_path)[1]
+    assert "pbns-tshirt.safetensors: not a safetensors file" in find_pretrained(job, tmp_path)[1]
     dataclasses.replace(TrainedModel.load(job.path(RunFolder(made[0]))), origin={}).save(path)
-    assert "a network of another training (assets, " in pretrained_network(job, tmp_path)[1]
+    assert "a network of another training (assets, " in find_pretrained(job, tmp_path)[1]
 
 
 def test_a_run_from_files_simulates_and_trains_nothing_but_a_users_own(made, tmp_path):
@@ -146,7 +146,7 @@ def test_every_row_of_a_pretrained_network_says_so(made, tmp_path):
     assert {row.pretrained for row in rows} == {remark, ""}
     theirs = {row.metric for row in rows if row.hardware == "a processor of theirs"}
     assert theirs == set(BEFORE_FRAMES)
-    assert described(plan, rows)["methods"]["pbns"]["label"] == "PBNS (pretrained)"
+    assert describe_plan(plan, rows)["methods"]["pbns"]["label"] == "PBNS (pretrained)"
 
 
 def test_networks_of_a_run_become_those_of_the_package(made, tmp_path):

@@ -14,7 +14,7 @@ from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.results.row import Row
 from benchmarks.runner.cells import judge
-from benchmarks.runner.execute_plan import accepted
+from benchmarks.runner.execute_plan import is_accepted
 from benchmarks.runner.rows import clock_costs, rows_of
 from benchmarks.runner.run_json import RunLog
 from benchmarks.runner.schedule import tasks_of
@@ -119,9 +119,9 @@ def test_an_extreme_case_may_fail_honestly_and_nothing_else_may():
     def row(suite, status, reason="why"):
         return Row(suite, "s", "m", 0, "x", "1", None, status, reason)
 
-    assert accepted(row("extremes", "stalled")) and accepted(row("garments", "skipped"))
-    assert not accepted(row("extremes", "failed")) and not accepted(row("garments", "stalled"))
-    assert not accepted(row("extremes", "stalled", ""))
+    assert is_accepted(row("extremes", "stalled")) and is_accepted(row("garments", "skipped"))
+    assert not is_accepted(row("extremes", "failed")) and not is_accepted(row("garments", "stalled"))
+    assert not is_accepted(row("extremes", "stalled", ""))
 
 
 def test_a_run_that_has_just_begun_leaves_what_the_rows_there_mean(tmp_path):

@@ -69,7 +69,7 @@ def test_what_a_killed_run_was_writing_is_removed_and_a_fresh_one_goes_on_from_n
 def test_an_interrupt_leaves_the_table_and_what_is_finished(tmp_path, monkeypatch, capsys):
     options = words_of(tmp_path, "simulation,newton-4")
     assert run.main(options) == 0
-    before, alone = RunFolder(tmp_path).read_rows(), InProcess.alone
+    before, alone = RunFolder(tmp_path).read_rows(), InProcess.run_alone
 
     def interrupted(self, task, needed):
         if " x newton-1" in task.label:
@@ -77,7 +77,7 @@ def test_an_interrupt_leaves_the_table_and_what_is_finished(tmp_path, monkeypatc
         return alone(self, task, needed)
 
     with monkeypatch.context() as patch:
-        patch.setattr(InProcess, "alone", interrupted)
+        patch.setattr(InProcess, "run_alone", interrupted)
         assert run.main(words_of(tmp_path, "simulation,newton-1,newton-4")) == 130
     assert "interrupted" in capsys.readouterr().err
     assert not [path for path in tmp_path.rglob("*") if ".part" in path.name]
@@ -130,10 +130,12 @@ def test_every_kind_of_kept_file_is_made_again_and_the_numbers_are_the_same(dres
     data = bytearray((folder / name).read_bytes())
     data[len(data) // 2] ^= 16
     (folder / name).write_bytes(data)
-    assert RunFolder(folder).changed(digests) == {name: "damaged"}
+    assert RunFolder(folder).find_changes(digests) == {name: "damaged"}
     assert run_dressed(folder) == dressed[1]
     config = RunFolder(folder).read_config()
-    assert set(config["digests"]) == set(digests) and not RunFolder(folder).changed(config["digests"])
+    assert set(config["digests"]) == set(digests) and not RunFolder(folder).find_changes(
+        config["digests"]
+    )
 
 
 def warmth() -> float:

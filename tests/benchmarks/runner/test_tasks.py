@@ -118,9 +118,9 @@ class TwoAtOnce(InProcess):
             for each in tasks:
                 yield each, each.run(self.context(), needed)
 
-    def alone(self, task, needed):
+    def run_alone(self, task, needed):
         self.at_work.append([task.name])
-        return super().alone(task, needed)
+        return super().run_alone(task, needed)
 
 
 def test_a_task_begins_when_its_needs_are_there_and_nothing_is_beside_a_timed_task(tmp_path):
@@ -154,10 +154,10 @@ def test_a_named_process_is_kept_until_it_is_released(tmp_path):
     executor = Executor(RunFolder(tmp_path), None, 1)
     first, second = (task(name, process="own") for name in ("first", "second"))
     try:
-        assert executor.alone(first, {}).result["memo"] == ["first"]
-        assert executor.alone(second, {}).result["memo"] == ["first", "second"]
+        assert executor.run_alone(first, {}).result["memo"] == ["first"]
+        assert executor.run_alone(second, {}).result["memo"] == ["first", "second"]
         executor.release("own")
-        assert executor.alone(second, {}).result["memo"] == ["second"]
+        assert executor.run_alone(second, {}).result["memo"] == ["second"]
     finally:
         executor.close()
 

@@ -15,7 +15,7 @@ from benchmarks.metrics.roll_out import EXTRAPOLATION, measure_extrapolation
 from benchmarks.plan.cell import Cell
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import model_path
-from benchmarks.runner.measurements import measured
+from benchmarks.runner.measurements import measure_roll_out
 from benchmarks.runner.rows import rows_of_cell
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.runner.task import Outcome
@@ -131,7 +131,7 @@ def test_the_body_of_another_shape_is_seen_by_every_method(assets, models):
             assert not np.array_equal(x, by_hand)
         depth = scene.obstacle.signed_distance(x[0], 0)
         assert np.median(depth) > -0.01, method  # [m]: a shirt of the mean body would be inside this one
-    assert scene.start == pytest.approx(dressed.skinned(scene.dressed.motion, betas)[0], abs=0.05)
+    assert scene.start == pytest.approx(dressed.skin(scene.dressed.motion, betas)[0], abs=0.05)
 
 
 @pytest.mark.parametrize("method, far, expected", [
@@ -148,7 +148,7 @@ def test_a_network_whose_shirt_is_on_no_body_has_diverged(roll_outs, tmp_path, m
     )
     roll_out.counterpart = free.counterpart
     free.group.roll_outs.append(roll_out)
-    values, _, ended = measured(roll_out, ("extrapolation",))
+    values, _, ended = measure_roll_out(roll_out, ("extrapolation",))
     # Of what is not finite the cell says so itself, and keeps its own words.
     verdict = ("ok", "") if whole else ("diverged", "not finite")
     scene = find_scene("out_of_distribution/walk_x4").at(SMOKE)

@@ -15,9 +15,9 @@ import pytest
 
 from benchmarks.assets import (
     Assets,
-    embedded_motions,
     joint_speeds,
     liveliest_part,
+    make_motions,
     open_assets,
     read_inputs,
 )
@@ -36,7 +36,7 @@ TINY = dataclasses.replace(SMOKE, garment_vertices=300, frames=8)
 
 
 def test_a_body_of_another_shape_wears_the_garment_of_the_mean_one(monkeypatch):
-    assets = open_assets(TINY, embedded_motions(["punch"]), ["tshirt"])
+    assets = open_assets(TINY, make_motions(["punch"]), ["tshirt"])
     garment, body = assets.garments["tshirt"], assets.body
     built = {place: shapes("punch")[place].at(TINY).build(assets) for place in (0, 1)}
     mean, other = built.values()
@@ -104,7 +104,7 @@ def test_a_clip_is_the_liveliest_part_and_what_is_not_judged_before_it():
 def test_a_clip_goes_on_where_the_whole_motion_is():
     """No jolt: its simulation and that of the whole motion are one until round-off has grown."""
     preset = dataclasses.replace(SMOKE, frames=24, clip_frames=8, warm_up_frames=4, settle_frames=6)
-    assets = open_assets(preset, embedded_motions(["sudden_stop"]), ["tshirt"])
+    assets = open_assets(preset, make_motions(["sudden_stop"]), ["tshirt"])
     scenes = all_scenes(["sudden_stop"], [])
     built = [scenes[f"tshirt/sudden_stop{part}"].at(preset).build(assets) for part in ("", "@clip")]
     whole, part = (simulated(scene).positions for scene in built)
@@ -135,10 +135,10 @@ import dataclasses, pickle, sys
 from pathlib import Path
 from benchmarks.methods import find_method
 from benchmarks.presets import find_preset
-from benchmarks.scenes import of_garment
+from benchmarks.scenes import find_garment
 assets, start, motion = pickle.loads(Path(sys.argv[1]).read_bytes())
 assets = dataclasses.replace(assets, motions={"kick": motion})
-scene = of_garment("tshirt").scene("kick").at(find_preset("smoke")).build(assets)
+scene = find_garment("tshirt").scene("kick").at(find_preset("smoke")).build(assets)
 method = find_method("lbfgs-5").make(models=Path("."), seed=0)
 method.prepare(dataclasses.replace(scene, settle=lambda: start))
 assert method.run().frames == 4
@@ -149,7 +149,7 @@ NETWORKS = {"torch", "snug.body.skinning", "snug.networks.dressed_body", "snug.n
 
 def test_solvers_of_a_dressed_body_load_no_network_library(tmp_path):
     """Networks need torch, whoever poses the body does not."""
-    assets = open_assets(SMOKE, embedded_motions(["kick"]), ["tshirt"])
+    assets = open_assets(SMOKE, make_motions(["kick"]), ["tshirt"])
     scene = dressed_scene("kick").build(assets)
     motion, path = assets.motions["kick"], tmp_path / "given"
     given = (assets, scene.start, motion.cut(0, 4))

@@ -12,7 +12,7 @@ from benchmarks.methods.simulation import Simulation
 from benchmarks.plan.plan import make_plan, protocol_of
 from benchmarks.plan.study import StudyError
 from benchmarks.results.protocol import OWN
-from benchmarks.scenes import of_garment
+from benchmarks.scenes import find_garment
 from benchmarks.scenes.dressed_body import with_self_contact
 from reference_sim import Cloth, Material, Obstacle
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
@@ -78,12 +78,12 @@ def test_the_option_makes_it_the_ground_truth_of_dressed_scenes(monkeypatch):
     )
     plan = make_plan(study)
     assert {s.name: s.self_contact for s in plan.scenes} == {"tshirt/kick": True, "flag": False}
-    learned_from = of_garment("tshirt", plan.motions.garments).scene("walk")
+    learned_from = find_garment("tshirt", plan.motions.garments).scene("walk")
     assert learned_from.self_contact
     of_kick, *_ = (cell for cell in plan.cells if cell.scene.dressed and cell.method == "simulation")
     assert protocol_of(of_kick, plan) == OWN  # another reference than that of the protocol
     without = make_plan(dataclasses.replace(study, self_contact=False))
     assert not any(scene.self_contact for scene in without.scenes)
-    monkeypatch.setitem(make_plan.__globals__, "installed", lambda package: False)
+    monkeypatch.setitem(make_plan.__globals__, "is_installed", lambda package: False)
     with pytest.raises(StudyError, match="self_contact: needs the package ipctk: pip install ipctk"):
         make_plan(study)

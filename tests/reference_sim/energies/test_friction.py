@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.metrics.energy import copied_terms, freeze_step
+from benchmarks.metrics.energy import copy_terms, freeze_step
 from benchmarks.metrics.energy_gap import optimality
 from benchmarks.scene import BuiltScene
 from reference_sim import Cloth, Obstacle, Potential, Trajectory, simulate
@@ -56,7 +56,7 @@ def test_the_simulation_ends_each_step_in_its_minimum_also_where_frames_are_jump
 def test_a_jumped_to_frame_has_the_friction_of_all_steps_in_a_row(judged):
     scene, trajectory = judged
     x, frame = trajectory.positions, FRAMES - 3
-    jump, row = Potential(copied_terms(scene)), Potential(copied_terms(scene))
+    jump, row = Potential(copy_terms(scene)), Potential(copy_terms(scene))
     freeze_step(scene, jump, x, 4)  # a frame of before, far from this one
     guess = freeze_step(scene, jump, x, frame)
     for t in range(1, frame + 1):
@@ -81,7 +81,7 @@ def test_friction_without_the_step_before_is_refused():
 
     belt = scene.obstacle
     for frame, obstacle, known in (
-        (5, belt, False), (6, belt, True), (8, belt, False), (9, belt.refined(2), False), (1, belt, True),
+        (5, belt, False), (6, belt, True), (8, belt, False), (9, belt.refine(2), False), (1, belt, True),
     ):  # fmt: skip
         if known:
             assert value(frame, obstacle) > 0

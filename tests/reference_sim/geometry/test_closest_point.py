@@ -107,7 +107,7 @@ def test_what_is_remembered_changes_nothing(name):
     tree, points = tree_of(positions, faces), samples(positions, faces)
     generator = np.random.default_rng(1)
     home = points[generator.permutation(len(points))]
-    for rest in ({}, {"samples": tree.listed(home, 1.0)}):
+    for rest in ({}, {"samples": tree.group(home, 1.0)}):
         cold = tree.nearest(points, **rest)
         for hints in (cold.faces, generator.integers(-1, len(faces), len(points))):
             warm = tree.nearest(points, hints=hints, **rest)
@@ -140,6 +140,6 @@ def test_only_faces_near_the_place_at_rest_are_met(name, region):
     tree.refit(moved)
     points, home = generator.normal(size=(2, 60, 3))
     expected, _ = one_by_one(moved[np.sort(faces, axis=1)], points, centroids, home, region)
-    closest = tree.nearest(points, samples=tree.listed(home, region)).faces
+    closest = tree.nearest(points, samples=tree.group(home, region)).faces
     assert (closest == expected).all()
     assert name == "soup 7" or (closest != tree.nearest(points).faces).any()

@@ -15,7 +15,7 @@ from reports.figures.charts import curves_of
 from reports.figures.plotting import PAGE_WIDTH, Drawing, style
 from reports.statistics.outcomes import PUBLISHED, read_published
 from reports.statistics.pareto import Point
-from reports.statistics.relative_excess import excess_of, with_relative_excess
+from reports.statistics.relative_excess import add_excess, excess_of
 from tests.reports.report_folder import row, run_of
 
 LEAST = 4.0  # [cm] that a panel is wide and high on paper
@@ -43,7 +43,7 @@ def test_dots_of_many_methods_are_their_excesses_in_each_motion(drawings):
     (axes,) = next(d.canvas for d in drawings if d.name == "excess_by_motion").axes
     row = [tick.get_text() for tick in axes.get_yticklabels()].index("SNUG")
     run = read_published(PUBLISHED / "ablations")
-    excess = excess_of(run, with_relative_excess(run, run.garment_rows), "snug")
+    excess = excess_of(run, add_excess(run, run.garment_rows), "snug")
     assert sorted(axes.lines[2 * row].get_xdata()) == pytest.approx(sorted(excess.by_motion.values()))
     assert len(axes.get_yticks()) == 15
 
@@ -90,7 +90,7 @@ def test_methods_keep_their_order_and_their_look():
     names = ["zebra", "newton-8", "snug", "newton-2", "simulation", "newton-4", "skinning"]
     run = run_of([row(method=name) for name in names])
     known = ["simulation", "skinning", "snug", "zebra", "newton-2", "newton-4", "newton-8"]
-    assert run.ordered(names) == known
+    assert run.order(names) == known
     assert style(run, "newton-2").label == "Newton, 2 iterations"
     assert style(run, "newton-2").colour == style(run, "newton-4").colour
 

@@ -9,10 +9,10 @@ import pandas as pd
 import pytest
 
 from benchmarks.methods import METHODS
-from benchmarks.metrics import declared
+from benchmarks.metrics import list_metrics
 from reports.statistics.effects import EXCESS
-from reports.statistics.means_and_spreads import AT_REFERENCE, share_of_frames, with_shares
-from reports.statistics.paper_claims import BEFORE, CLAIMS, PRIMARY, counts, in_words, judged, with_before
+from reports.statistics.means_and_spreads import AT_REFERENCE, add_shares, share_of_frames
+from reports.statistics.paper_claims import BEFORE, CLAIMS, PRIMARY, add_cost, count, judge_claims, phrase
 from reports.tables.page_one import ANSWERS
 from tests.reports.report_folder import row, run_of
 
@@ -24,7 +24,7 @@ MOTIONS = tuple(f"tshirt/{name}" for name in ("kick", "walk", "jump", "bow"))  #
 
 def told(rows, **more):
     """(metric, lower, higher) -> the judged claim."""
-    lines = judged(replace(run_of(rows), **more))
+    lines = judge_claims(replace(run_of(rows), **more))
     return {(line.claim.metric, line.claim.lower, line.claim.higher): line for line in lines}
 
 
@@ -48,7 +48,7 @@ def test_the_amplitude_of_a_hem_stands_behind_its_correlation_and_never_alone():
     claims = [claim for claim in CLAIMS if claim.metric in both]
     assert [claim.metric for claim in claims] == both * (len(claims) // 2)
     assert [c.lower + c.higher for c in claims[::2]] == [c.lower + c.higher for c in claims[1::2]]
-    for names in (declared(), AT_REFERENCE, ANSWERS):
+    for names in (list_metrics(), AT_REFERENCE, ANSWERS):
         assert [name for name in names if name in both] == both
 
 
@@ -111,13 +111,13 @@ def test_the_primary_family_is_the_same_whatever_a_run_has_and_others_are_not_co
         rows += seeds("pbns", (1.1, 2.0, 2.9), f"energy/{term}")
     lines = told(rows)
     assert lines[STRAIN].p == alone.p and lines[STRAIN].compared.effect == alone.compared.effect
-    assert counts(lines.values()) == {"inconclusive": 3}
-    assert in_words(counts(lines.values())) == "3 are inconclusive"
+    assert count(lines.values()) == {"inconclusive": 3}
+    assert phrase(count(lines.values())) == "3 are inconclusive"
     names = {"snug": "snug-paper", "pbns": "pbns-paper"}
     explored = told([replace(r, method=names[r.method], pairing_group=names[r.method]) for r in rows])
     line = explored["energy/strain", "snug-paper", "pbns-paper"]
     assert not line.claim.primary and line.p == pytest.approx(bare) and line.verdict == "holds"
-    assert counts(explored.values()) == {}
+    assert count(explored.values()) == {}
 
 
 @pytest.mark.parametrize(
@@ -142,7 +142,7 @@ def test_two_orders_of_magnitude_are_judged_with_their_factor(supervised, verdic
     # What its simulations took is not known any more: there is no sum.
     unknown = [r for r in rows if (r.method, r.metric) != ("tailornet", "cost/data")]
     frame = run_of(unknown).frame
-    assert COST not in told(unknown) and set(with_before(frame)[len(frame) :]["method"]) == {"snug"}
+    assert COST not in told(unknown) and set(add_cost(frame)[len(frame) :]["method"]) == {"snug"}
 
 
 NOTHING = (None, None)  # values of two seeds
@@ -169,7 +169,7 @@ def test_what_diverged_with_every_seed_in_enough_motions_is_the_worse_one(
     rows += seeds({"pbns": "snug", "snug": "pbns"}[broken], (1.0, 1.1), motions=MOTIONS[:motions])
     line = told(rows)[STRAIN]
     assert (line.verdict, line.remark) == (verdict, remark)
-    assert (line.compared.effect, line.p) == (None, None) and counts([line]) == {verdict: 1}
+    assert (line.compared.effect, line.p) == (None, None) and count([line]) == {verdict: 1}
     # A roll-out that came to its end shows that not every one does not.
     assert told([*rows, row(MOTIONS[0], broken, "cost/frame", 1.0)]) == {}
 
@@ -207,12 +207,12 @@ def test_the_share_of_frames_with_more_energy_is_counted_scene_by_scene_and_seed
     frames = frame_table(
         snug=[[1, 1, 9, 3], [1, 1, 1]], pbns=[[2, 2, 2, 3, 5], [2, 2, np.nan]], other=[[0.0]]
     )
-    made = with_shares(run.frame, frames, "strain", "snug", "pbns")
+    made = add_shares(run.frame, frames, "strain", "snug", "pbns")
     shares = made[made["metric"] == share_of_frames("strain").name]
     percentages = {(line.method, line.seed): line.value for line in shares.itertuples()}
     assert percentages == {("snug", 0): 25.0, ("snug", 1): 0.0, ("pbns", 0): 50.0, ("pbns", 1): 100.0}
     assert set(shares["unit"]) == {"%"} and shares["usable"].all() and len(shares) == 4 * len(MOTIONS)
-    assert len(with_shares(run.frame, frames, "inertia", "snug", "pbns")) == len(run.frame)
+    assert len(add_shares(run.frame, frames, "inertia", "snug", "pbns")) == len(run.frame)
 
 
 @pytest.mark.parametrize(

@@ -17,8 +17,8 @@ from reports.statistics.effects import (
     RATIO,
     cost_effect,
     effect,
-    off_scale,
-    on_scale,
+    rescale,
+    unscale,
 )
 from reports.statistics.means_and_spreads import Mean, mean_of, pair
 from tests.reports.report_folder import row, run_of
@@ -211,9 +211,9 @@ def test_what_every_motion_repeats_exactly_is_certain():
 
 def test_shares_of_excess_are_compared_by_logarithm_above_one_percent_and_by_difference_below():
     shares = np.array((-0.3, 0.0, 0.01, 60.0, 120.0))
-    assert off_scale(on_scale(shares, EXCESS), EXCESS) == pytest.approx(shares)
-    assert on_scale(120.0, EXCESS) - on_scale(60.0, EXCESS) == pytest.approx(math.log(2.0), abs=1e-3)
-    assert on_scale(0.02, EXCESS) - on_scale(0.01, EXCESS) == pytest.approx(0.01, rel=1e-3)
+    assert unscale(rescale(shares, EXCESS), EXCESS) == pytest.approx(shares)
+    assert rescale(120.0, EXCESS) - rescale(60.0, EXCESS) == pytest.approx(math.log(2.0), abs=1e-3)
+    assert rescale(0.02, EXCESS) - rescale(0.01, EXCESS) == pytest.approx(0.01, rel=1e-3)
     motions = np.array([[2.0], [4.0], [8.0], [16.0]])
     comparison = effect(mean_over(motions), mean_over(0.0 * motions, "simulation"), EXCESS)
     logs = np.arcsinh(motions)
@@ -261,10 +261,10 @@ def test_two_starts_make_the_noise_and_smaller_steps_a_trend_that_may_turn_the_s
     comparison = effect(*moved_means({"snug": snug, "pbns": none}), DIFFERENCE)
     assert comparison.uncertainty == pytest.approx(math.sqrt((0.3**2 + 0.2**2) / 4.0))
     assert comparison.against == pytest.approx({TWINS[1]: 1.2, TWINS[2]: 1.4})
-    assert comparison.value == pytest.approx(-0.3) and comparison.turned_by() == list(TWINS[1:])
+    assert comparison.value == pytest.approx(-0.3) and comparison.find_reversals() == list(TWINS[1:])
     # What a member does to both methods moves them not apart, on the scale of the test.
     both = effect(*moved_means({"snug": snug, "pbns": snug}), DIFFERENCE)
-    assert both.uncertainty == pytest.approx(0.0) and both.turned_by() == []
+    assert both.uncertainty == pytest.approx(0.0) and both.find_reversals() == []
     logs = [np.log(1.0 + np.array(moves)).mean() for moves in zip(*snug)]
     assert effect(*moved_means({"snug": snug, "pbns": none})).uncertainty == pytest.approx(
         math.sqrt((logs[0] ** 2 + (logs[1] - logs[2]) ** 2) / 4.0)

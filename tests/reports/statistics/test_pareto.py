@@ -9,9 +9,9 @@ import pytest
 from benchmarks.results.row import Row
 from reports.statistics.pareto import (
     Point,
-    fastest,
+    find_fastest,
     front,
-    indistinct,
+    noise_floor,
     points_of,
     rivals,
     run_time,
@@ -54,8 +54,8 @@ def all_rows() -> list[Row]:
 def test_the_front_holds_those_that_nothing_beats():
     points = [Point("a", 1.0, 5.0), Point("b", 2.0, 6.0), Point("c", 3.0, 1.0), Point("d", 3.0, 2.0)]
     assert [p.method for p in front(points)] == ["a", "c"]
-    assert fastest(points, 2.0) == points[2]
-    assert fastest(points, 0.5) is None
+    assert find_fastest(points, 2.0) == points[2]
+    assert find_fastest(points, 0.5) is None
 
 
 def test_points_need_every_scene():
@@ -101,7 +101,7 @@ def test_an_error_cannot_be_told_apart_below_that_of_the_references_other_start(
             for scene, value in zip(SCENES, (3.0, 5.0))
             for member in ("simulation-perturbed-1e-4", "simulation-dt/8")
         ]
-        return indistinct(run_of(rows), run_of(rows).frame, "distance/rms")
+        return noise_floor(run_of(rows), run_of(rows).frame, "distance/rms")
 
     assert band() == pytest.approx(4.0)
     assert band(status="stalled", reason="a frame") == pytest.approx(3.0)  # takes no part

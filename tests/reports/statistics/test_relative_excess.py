@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from reports.statistics.relative_excess import RELATIVE_EXCESS, with_relative_excess
+from reports.statistics.relative_excess import RELATIVE_EXCESS, add_excess
 from reports.tables.findings import relative_excess
 from tests.reports.report_folder import row, run_of
 
@@ -14,7 +14,7 @@ ENSEMBLE = "simulation-perturbed-1e-4"
 
 def shares(*rows):
     run = run_of(rows)
-    made = with_relative_excess(run, run.frame)
+    made = add_excess(run, run.frame)
     return made[made["metric"] == RELATIVE_EXCESS.name].set_index("method")
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from benchmarks.metric import Metric
 from reports.statistics.effects import DIFFERENCE, RANGE, RATIO, Effect
-from reports.statistics.verdicts import LESS, MORE, OPEN, TIED, compare_methods, holm, standing, why_open
+from reports.statistics.verdicts import LESS, MORE, OPEN, TIED, compare_methods, decide, explain, holm
 from tests.reports.report_folder import row, run_of
 
 FAR = Effect(0.2, RATIO, error=0.01, freedom=10.0, motions=4)
@@ -55,7 +55,7 @@ STEP = "simulation-dt/8"
 )
 def test_how_one_method_stands_to_another(far, changed, expected):
     far = replace(far, **changed)
-    assert standing(far, far.p_value()) == expected
+    assert decide(far, far.p_value()) == expected
 
 
 def test_one_reading_of_a_clock_gives_no_verdict_and_one_of_a_size_does():
@@ -71,13 +71,13 @@ def test_one_reading_of_a_clock_gives_no_verdict_and_one_of_a_size_does():
         ).effect
         for name, of in (("cost/frame", "machine"), ("cost/memory", "method"))
     )
-    assert (standing(time, None), why_open(time)) == (OPEN, ": no range")
-    assert (standing(size, None), why_open(size)) == (LESS, "")
+    assert (decide(time, None), explain(time)) == (OPEN, ": no range")
+    assert (decide(size, None), explain(size)) == (LESS, "")
 
 
 def test_a_time_step_with_another_sign_is_named():
     far = replace(FAR, against={"simulation-dt/4": -0.1, STEP: -0.3})
-    assert why_open(far) == f": other sign against {STEP}"
+    assert explain(far) == f": other sign against {STEP}"
 
 
 def test_holm_by_hand():

@@ -31,19 +31,19 @@ def test_template_is_an_adult_of_one_closed_surface(body):
 
 
 def test_shapes_start_at_the_template_and_the_first_one_is_height(body):
-    np.testing.assert_array_equal(body.shaped(np.zeros(10)), body.template)
+    np.testing.assert_array_equal(body.rest_vertices(np.zeros(10)), body.template)
     np.testing.assert_array_equal(body.joints(np.zeros(10)), body.joint_template)
     tall = np.eye(10)[0]
-    gain = np.ptp(body.shaped(tall)[:, 1]) - np.ptp(body.shaped(-tall)[:, 1])
+    gain = np.ptp(body.rest_vertices(tall)[:, 1]) - np.ptp(body.rest_vertices(-tall)[:, 1])
     assert 0.10 < gain < 0.30  # two standard deviations of the height of adults of both sexes
-    fat = np.eye(10)[1]
-    change = volume(body.shaped(fat), body.faces) / volume(body.shaped(-fat), body.faces)
-    assert change > 1.1 and abs(np.ptp(body.shaped(fat)[:, 1]) - np.ptp(body.shaped(-fat)[:, 1])) < 0.03
+    fat, slim = body.rest_vertices(np.eye(10)[1]), body.rest_vertices(-np.eye(10)[1])
+    change = volume(fat, body.faces) / volume(slim, body.faces)
+    assert change > 1.1 and abs(np.ptp(fat[:, 1]) - np.ptp(slim[:, 1])) < 0.03
 
 
 def test_joints_stay_inside_every_body(body):
     for betas in np.random.default_rng(0).normal(size=(3, 10)):
-        inside = igl.fast_winding_number(body.shaped(betas), body.faces, body.joints(betas))
+        inside = igl.fast_winding_number(body.rest_vertices(betas), body.faces, body.joints(betas))
         assert inside.min() > 0.5, [JOINT_NAMES[j] for j in np.flatnonzero(inside < 0.5)]
 
 
@@ -59,7 +59,7 @@ def test_vertices_agree_with_the_skinning_used_in_training(body):
     )
     some = slice(0, None, 97)
     expected = skin(
-        torch.from_numpy(body.shaped(betas)[some]),
+        torch.from_numpy(body.rest_vertices(betas)[some]),
         torch.from_numpy(body.skinning_weights[some]),
         transforms,
     )

@@ -8,7 +8,7 @@ import igl
 import numpy as np
 import pytest
 
-from benchmarks.assets import embedded_motions, open_assets, read_inputs
+from benchmarks.assets import make_motions, open_assets, read_inputs
 from benchmarks.presets import find_preset
 from benchmarks.scenes import GarmentScenes
 from reference_sim.energies import BendHinge, StretchStVK
@@ -149,7 +149,7 @@ def test_its_material_is_that_of_simulator_and_training(tmp_path, body, tube):
     (tmp_path / "silk.toml").write_text("young_modulus = 5e4\nbending_stiffness = 1e-6\n")
     file = GarmentFile(path=saved(tmp_path, tube), material=tmp_path / "silk.toml")
     preset = replace(find_preset("smoke"), frames=8, clip_frames=4)
-    assets = open_assets(preset, embedded_motions(["walk"]), ["mine"], inputs=read_inputs(garment=file))
+    assets = open_assets(preset, make_motions(["walk"]), ["mine"], inputs=read_inputs(garment=file))
     silk = Material(young_modulus=5e4, bending_stiffness=1e-6)
     scene = GarmentScenes("mine", "mine").scene("walk").at(preset).build(assets)
     assert scene.cloth.material == DressedBody(body, assets.garments["mine"]).cloth.material == silk

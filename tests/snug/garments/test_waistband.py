@@ -6,7 +6,7 @@ import igl
 import numpy as np
 import pytest
 
-from benchmarks.assets import embedded_motions, open_assets
+from benchmarks.assets import make_motions, open_assets
 from benchmarks.methods import find_method
 from benchmarks.presets import find_preset
 from benchmarks.results.run_folder import RunFolder
@@ -21,7 +21,7 @@ TINY = dataclasses.replace(find_preset("smoke"), garment_vertices=300, frames=10
 
 @pytest.fixture(scope="module")
 def small():
-    return open_assets(TINY, embedded_motions(["turning_stop"]), ["skirt"])
+    return open_assets(TINY, make_motions(["turning_stop"]), ["skirt"])
 
 
 @pytest.fixture(scope="module")

@@ -26,7 +26,7 @@ def test_a_taught_baseline_learns_its_targets(kind, narrow):
     model = short(kind, motions=[motion], steps=30, recipe=recipe, every=10)
     assert model.history[-1]["loss"] < 0.5 * model.history[0]["loss"]
     target, positions = stand_in(motion), roll_out(model, tube_dress(), motion).positions
-    skinned = tube_dress().skinned(motion, smoothing=20)
+    skinned = tube_dress().skin(motion, smoothing=20)
     error, start = (np.linalg.norm(x - target, axis=2).mean() for x in (positions, skinned))
     assert error < 0.5 * start
 

@@ -34,7 +34,7 @@ def by_torch(model: TrainedModel, motion) -> tuple[np.ndarray, np.ndarray]:
     features = dressed.features(motion, model.recipe, feature_set=model.network.feature_set)
     with torch.no_grad():
         offsets = model.network(features[None])[0][0]
-    posed = dressed.skinned(motion, smoothing=model.recipe.smoothing, offsets=offsets)
+    posed = dressed.skin(motion, smoothing=model.recipe.smoothing, offsets=offsets)
     return posed, offsets.numpy()
 
 

@@ -46,8 +46,8 @@ def test_a_quasi_static_frame_forgets_the_past_and_the_velocity():
 
 def test_body_shape_changes_the_roll_out_and_the_network_sees_shapes_it_has_met():
     dressed, motion = tube_dress(), swaying()
-    shaped = dressed.skinned(motion, SHAPED, smoothing=DEFAULT.smoothing)
-    unshaped = dressed.skinned(motion, smoothing=DEFAULT.smoothing)
+    shaped = dressed.skin(motion, SHAPED, smoothing=DEFAULT.smoothing)
+    unshaped = dressed.skin(motion, smoothing=DEFAULT.smoothing)
     assert np.abs(shaped - unshaped).max() > 5e-3
     for shapes, least, most in ((3.0, 1e-4, 1.0), (0.0, 0.0, 1e-5)):
         recipe = replace(DEFAULT, shape_range=shapes)

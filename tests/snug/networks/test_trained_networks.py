@@ -11,7 +11,7 @@ from snug.networks.trained_model import TrainedModel
 
 PACKAGE = Path(trained.FOLDER).parents[1]
 LARGEST = 60e6  # bytes of the whole package
-NETWORKS = sorted(trained.trained_networks())
+NETWORKS = sorted(trained.list_networks())
 
 
 def test_the_package_has_the_networks_of_the_default_run_and_stays_small():

@@ -16,7 +16,7 @@ from snug.garments.templates import find_template
 from snug.kinds import KINDS
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
-from snug.networks.trained_model import TrainedModel, digest_of_triangles
+from snug.networks.trained_model import TrainedModel, digest_triangles
 from snug.recipe import DEFAULT, Recipe
 from snug.training.contact_cache import PARTS, Patch
 from snug.training.optimisation_step import Trainer, start_network
@@ -83,7 +83,7 @@ def leaning(motion: Motion) -> Motion:
 def beside_skin(contact, frames: list[int], **region) -> tuple[Patch, torch.Tensor, torch.Tensor]:
     """The patch of skin that samples may touch; it (T, P, 3) and the tube in frames of swaying(), posed."""
     dressed = tube_dress()
-    patch = Patch(contact.rest_samples, dressed.body.shaped(), dressed.body.faces, **region)
+    patch = Patch(contact.rest_samples, dressed.body.rest_vertices(), dressed.body.faces, **region)
     weights = torch.as_tensor(dressed.body.skinning_weights[patch.body_vertices]).float()
     transforms = dressed.transforms(swaying().poses[frames])
     posed = skin(torch.as_tensor(patch.rest), weights, transforms)
@@ -110,7 +110,7 @@ def stand_in(motion: Motion) -> np.ndarray:
     """World vertices (T, V, 3) [m] in place of a simulation: the tube, the wider the more it bends."""
     bend = torch.as_tensor(motion.poses[:, 3, 2]).float()[:, None, None]
     offsets = (0.05 + 0.1 * bend) * tube_dress().rest() + torch.tensor([0.0, -0.01, 0.0])
-    return tube_dress().skinned(motion, smoothing=20, offsets=offsets)
+    return tube_dress().skin(motion, smoothing=20, offsets=offsets)
 
 
 def short(kind: str = "snug", *, motions=None, dressed=None, recipe: Recipe = PLAIN, **options):
@@ -129,7 +129,7 @@ def untrained_model(kind: str, dressed: DressedBody, motions, *, seed: int, reci
     options = {"features": how.network.feature_set, "sequences": how.network.sequential}
     data = TrainingSet(dressed, motions, recipe, **options)
     network = start_network(kind, data, seed=seed).eval()
-    triangles = digest_of_triangles(dressed.garment.faces)
+    triangles = digest_triangles(dressed.garment.faces)
     return TrainedModel(
         kind, network, recipe, seed=seed, unit=how.unit, fps=1.0 / data.dt, triangles=triangles
     )

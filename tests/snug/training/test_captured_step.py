@@ -92,7 +92,7 @@ def test_a_batch_that_is_not_followed_is_left_to_single_operations(energy, monke
             trainer.recipe = replace(PLAIN, spike=1e-6 if odd else 1e6)
             trainer.guard.spike = trainer.recipe.spike
             trainer.loss._definitions = (
-                partial(with_energy, trainer.loss._defined, energy) if odd else trainer.loss._defined
+                partial(with_energy, trainer.loss._evaluate, energy) if odd else trainer.loss._evaluate
             )
         assert captured.step(number) == pytest.approx(plain.step(number), rel=1e-5, nan_ok=True)
         if odd:
@@ -119,7 +119,7 @@ def test_what_a_gpu_compiles_is_traced_whole(monkeypatch):
     plain = make_trainer(PAPER, kernels=False)
     for module in ("optimisation_step", "training_set", "physics_loss", "contact_planes",
                    "contact_cache_torch"):  # fmt: skip
-        monkeypatch.setattr(f"snug.training.{module}.compiled", traced)
+        monkeypatch.setattr(f"snug.training.{module}.compile_for", traced)
     compiled = make_trainer(PAPER, kernels=False)
     for number in range(2):
         expected, losses = plain.step(number), compiled.step(number)

@@ -120,7 +120,7 @@ STIFF = replace(DRESSED.garment, material=Material(young_modulus=1e6))
     [
         ("snug", {"seed": 1}, (), "another seed"),
         ("snug", {"dressed": DressedBody(DRESSED.body, STIFF)}, (), "another material"),
-        ("supervised", {"trajectories": {"sway": DRESSED.skinned(swaying(30))}}, (), "another data"),
+        ("supervised", {"trajectories": {"sway": DRESSED.skin(swaying(30))}}, (), "another data"),
         ("snug", {}, (torch, "get_num_threads", lambda: 7), "another threads"),
         (
             "snug",

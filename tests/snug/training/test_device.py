@@ -87,7 +87,7 @@ def test_anchors_walk_to_the_closest_skin_by_torch_and_by_kernels(region):
     fast.energy(*on, walk=True)
     chosen = torch.as_tensor(frames)
     at = torch.arange(2), positions, torch.as_tensor(normals).float()
-    slow.place(chosen, slow.walked(samples, chosen, *at, reach=contact.margin))
+    slow.place(chosen, slow.walk(samples, chosen, *at, reach=contact.margin))
     for row, frame in enumerate(frames):
         searched.requery(int(frame), samples[row].numpy(), positions[row].numpy(), exact=True)
 

@@ -22,7 +22,7 @@ NAMES = ("07_01", "02_01", "02_02")
 def simulations() -> list[tuple[Motion, np.ndarray]]:
     """In place of simulations: the tube skinned to the body."""
     motions = [make_motion(name).cut(0, FRAMES) for name in NAMES]
-    return [(motion, np.asarray(tube_dress().skinned(motion), dtype=float)) for motion in motions]
+    return [(motion, np.asarray(tube_dress().skin(motion), dtype=float)) for motion in motions]
 
 
 @pytest.fixture(scope="module")

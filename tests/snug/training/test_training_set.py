@@ -20,7 +20,7 @@ def test_windows_stay_within_a_motion_and_all_come_by():
         assert ((frames < 9).all(axis=1) | (frames >= 9).all(axis=1)).all()
         starts |= set(frames[:, 0].tolist())
     assert starts == {*range(7), *range(9, 14)}
-    assert trainer.data.where(9 + 3) == "motion 'b' frame 3"
+    assert trainer.data.name_frame(9 + 3) == "motion 'b' frame 3"
     disjoint = TrainingSet(
         tube_dress(), clips, replace(PLAIN, window_stride=3), features="motion", sequences=True
     )

@@ -48,7 +48,7 @@ def test_what_is_no_number_or_not_trusted_moves_no_anchor(kernels):
         return [torch.equal(torch.as_tensor(table), held) for table, held in zip(now, before)]
 
     batch = trainer.data.batch(np.arange(4), None)
-    posed = contact.bodies.posed(batch)
+    posed = contact.bodies.pose(batch)
     x = skin(batch.rest, trainer.weights, batch.transforms) - torch.tensor([0.0, 0.0, 0.08])
     for vertices, trusted, moved in ((torch.nan * x, True, False), (x, False, False), (x, True, True)):
         trainer.loss(vertices, batch.lead, contact.planes(batch, posed, vertices))
@@ -73,7 +73,7 @@ def test_a_sampled_shape_is_touched_where_its_body_is(kernels):
     batch = trainer.data.batch(
         np.array([4, 17]), betas
     )  # windows of the first motion begin at every frame
-    rows, positions, _ = contact.bodies.posed(batch)
+    rows, positions, _ = contact.bodies.pose(batch)
     assert sorted(rows.tolist()) == list(range(6))
     expected = [patch_of(contact, MOTIONS[0], slice(f, f + 3), shape) for f, shape in zip((4, 17), betas)]
     assert np.allclose(np.asarray(positions)[rows], np.concatenate(expected), atol=1e-4)
@@ -89,7 +89,7 @@ def test_a_clip_of_another_shape_is_touched_where_its_body_is(kernels):
     for place in (1, 2, 3):
         first = data.first[place]
         expected = patch_of(contact, clips[place], slice(3, 6), data.shapes[place])
-        rows, positions, _ = contact.bodies.posed(data.at(first + np.array([[3, 4, 5]])))
+        rows, positions, _ = contact.bodies.pose(data.at(first + np.array([[3, 4, 5]])))
         assert np.allclose(np.asarray(positions)[rows], expected, atol=1e-4)
         marks = contact.bodies.marks[first + 3 : first + 6]
         assert np.allclose(marks, expected[:, ::MARKED], atol=1e-4)

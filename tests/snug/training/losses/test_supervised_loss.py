@@ -29,7 +29,7 @@ def test_a_step_descends_by_the_distance_and_lambda_times_the_energies():
     taken = [p.grad.clone() for p in trainer.network.parameters()]
     trainer.network.closed_form = False
     x = skin(trainer.network(batch.features)[0] + batch.rest, trainer.weights, batch.transforms)
-    rows, *body = trainer.contact.bodies.posed(batch)
+    rows, *body = trainer.contact.bodies.pose(batch)
     planes = planes_of(trainer.contact.cache, batch.frames.ravel(), rows.ravel(), *body)
     points, normals = (torch.as_tensor(a).view(*x.shape[:2], -1, 3) for a in planes)
     terms = {
