@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import json
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -89,9 +89,9 @@ class Scored:
         timed = rows[(rows["method"] == self.method) & (rows["metric"] == TIME)]
         declared = (timed["reason"] == DECLARED).any()
         clock = "declared" if declared else "measured" if len(timed) else "unknown"
-        energy: Cell = None
-        if excess is not None:  # an interval over fewer motions says nothing
-            energy = excess.effect if excess.effect.motions >= LEAST_MOTIONS else excess.typical
+        energy = excess.effect if excess else None
+        if energy and energy.motions < LEAST_MOTIONS:  # its interval says nothing
+            energy = replace(energy, error=None, covers="")
         config = self.run.config
         hashes = config.get("roll_outs") if self.folder else None
         origin = (config.get("commit") or "", (config.get("date") or config.get("started") or "")[:10])
@@ -167,8 +167,7 @@ def entries_tables(
 
 
 def _excess(cells: tuple[Cell, ...]) -> float:
-    excess = cells[2].shown if isinstance(cells[2], Effect) else cells[2]
-    return excess if isinstance(excess, float) else float("inf")
+    return cells[2].shown if isinstance(cells[2], Effect) else float("inf")
 
 
 def page_of(folder: Path, name: str, run: Run) -> str:

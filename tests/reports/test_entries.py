@@ -26,7 +26,10 @@ def write_run(path, totals, scenes, protocol, **config):
         row(scene, name, metric, value, protocol=protocol, reason=reasons.get(metric, ""))
         for scene in scenes
         for name, total in (TOTAL | totals).items()
-        for metric, value in {"energy/total": total, **numbers}.items()
+        for metric, value in {
+            "energy/total": total[scene] if isinstance(total, dict) else total,
+            **numbers,
+        }.items()
     ]
     path.mkdir(parents=True)
     return read_run(run_folder(path, rows, **config))
@@ -63,7 +66,7 @@ def test_a_table_has_one_protocol_and_one_set_of_scenes_and_is_sorted(tmp_path, 
         "Protocol 1.0; scenes: 1 of 2: tshirt/a.": ["part", "SNUG", "Skinning"],
     }
     lines = {line[1].split()[0]: line for table in tables for line in table.rows}
-    assert lines["better"][2] == pytest.approx(1.0) and lines["worse"][2] == pytest.approx(25.0)
+    assert lines["better"][2].shown == pytest.approx(1.0) and lines["worse"][2].interval is None
     assert (lines["better"][6], lines["SNUG"][6]) == ("declared", "measured")
     assert (lines["better"][0], lines["worse"][0]) == (1, 3)
     assert {line[8] for name, line in lines.items() if name != "SNUG"} == {
@@ -74,6 +77,11 @@ def test_a_table_has_one_protocol_and_one_set_of_scenes_and_is_sorted(tmp_path, 
     assert "<script>window" not in page
     content = json.loads(re.search(r'id="content">(.*?)</script>', page, re.DOTALL)[1])
     assert f"better {NASTY}; they" in json.dumps(content, ensure_ascii=False)
+
+
+def test_a_roll_out_that_fell_off_is_seen_in_an_entry_of_few_motions(tmp_path, published):
+    entry = load_entry(write_entry(tmp_path, "mine", {"tshirt/a": 1.8, "tshirt/b": -20.0}))
+    assert entry.cells()[2].shown == pytest.approx(10.0) and not entry.cells()[2].complete
 
 
 def test_scores_of_files_as_they_were_scored_are_marked_by_who_made_them(tmp_path, published):
