@@ -15,7 +15,7 @@ from benchmarks.scenes.hard_motions import ENDS, EVERY, FRAMES, LOOP_BLEND
 from snug.motion.library import make_motion
 from snug.networks.roll_out import roll_out
 from tests.benchmarks.runner.tasks_by_hand import assets_of, grouped, prepared
-from tests.snug.training.dressing import swaying, tube_dress, untrained_model
+from tests.snug.training.dressing import random_model, swaying, tube_dress
 
 SMOKE = PRESETS[0]
 
@@ -56,7 +56,7 @@ def test_a_loop_comes_back_to_its_pose_and_goes_on_over_the_ground():
 
 def test_the_long_roll_out_is_the_short_one_carried_on_and_only_some_frames_are_held(tmp_path):
     dressed, walk = tube_dress(), make_motion("walk")
-    scene, model = long_scene(dressed), untrained_model("snug", dressed, [walk], seed=0)
+    scene, model = long_scene(dressed), random_model("snug", dressed, [walk], seed=0)
     model.save(model_path(tmp_path, "snug", 0))
     x = prepared("snug", scene, tmp_path).run().positions
     motion, early, late = hard_motions.repeat_walk(walk, SMOKE.loop_frames)

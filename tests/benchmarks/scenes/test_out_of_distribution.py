@@ -28,7 +28,7 @@ from snug.networks.roll_out import roll_out
 from snug.networks.trained_model import TrainedModel
 from tests.benchmarks.plan.planned import planned
 from tests.benchmarks.runner.tasks_by_hand import grouped, plan_of, prepared, trajectory_of
-from tests.snug.training.dressing import tailored, untrained_model
+from tests.snug.training.dressing import random_model, tailored
 
 SMOKE = find_preset("smoke")
 
@@ -43,7 +43,7 @@ def models(assets, tmp_path_factory):
     """Return the folder of a saved network with a random last layer."""
     folder = tmp_path_factory.mktemp("models")
     dressed = DressedBody(assets.body, assets.garments["tshirt"])
-    untrained_model("snug", dressed, [make_motion("walk")], seed=0).save(model_path(folder, "snug", 0))
+    random_model("snug", dressed, [make_motion("walk")], seed=0).save(model_path(folder, "snug", 0))
     return folder
 
 

@@ -10,7 +10,7 @@ from snug.networks.garment_network import make_network
 from snug.networks.roll_out import RollOutError, prepare_frame_inputs, prepare_frames, roll_out
 from snug.networks.trained_model import TrainedModel
 from snug.recipe import DEFAULT
-from tests.snug.training.dressing import swaying, tube_dress, untrained_model
+from tests.snug.training.dressing import random_model, swaying, tube_dress
 
 SHAPED = np.array([0.0, 2.0, 0, 0, 0, 0, 0, 0, 0, 0])
 
@@ -18,7 +18,7 @@ SHAPED = np.array([0.0, 2.0, 0, 0, 0, 0, 0, 0, 0, 0])
 @pytest.mark.parametrize("kind", ["snug", "pbns"])
 def test_what_came_before_a_motion_is_known_to_inputs_and_state(kind):
     dressed, motion = tube_dress(), swaying()
-    model = untrained_model(kind, dressed, [motion], seed=2)
+    model = random_model(kind, dressed, [motion], seed=2)
     whole = roll_out(model, dressed, motion).positions[5:]
     before, rest = motion.cut(0, 5), motion.cut(5, motion.frames)
     begin = prepare_frames(model, dressed, rest, earlier=before)
@@ -33,7 +33,7 @@ def test_what_came_before_a_motion_is_known_to_inputs_and_state(kind):
 
 def test_a_quasi_static_frame_forgets_the_past_and_the_velocity():
     dressed, motion = tube_dress(), swaying()
-    model = untrained_model("snug", dressed, [motion], seed=0)
+    model = random_model("snug", dressed, [motion], seed=0)
     held = roll_out(model, dressed, motion, quasi_static=True)
     reordered = type(motion)("back", motion.poses[::-1], motion.translations[::-1] * 2.0)
     back = roll_out(model, dressed, reordered, quasi_static=True)
@@ -51,7 +51,7 @@ def test_body_shape_changes_the_roll_out_and_the_network_sees_shapes_it_has_met(
     assert np.abs(shaped - unshaped).max() > 5e-3
     for shapes, least, most in ((3.0, 1e-4, 1.0), (0.0, 0.0, 1e-5)):
         recipe = replace(DEFAULT, shape_range=shapes)
-        model = untrained_model("snug", dressed, [motion], seed=0, recipe=recipe)
+        model = random_model("snug", dressed, [motion], seed=0, recipe=recipe)
         offsets = roll_out(model, dressed, motion, SHAPED).positions - shaped
         plain = roll_out(model, dressed, motion).positions - unshaped
         assert least <= np.abs(offsets - plain).max() < most
@@ -59,7 +59,7 @@ def test_body_shape_changes_the_roll_out_and_the_network_sees_shapes_it_has_met(
 
 def test_misfits_of_vertices_triangles_and_rate_are_named():
     dressed, motion, fast = tube_dress(), swaying(), swaying(fps=60.0)
-    snug, pbns = (untrained_model(kind, dressed, [motion], seed=0) for kind in ("snug", "pbns"))
+    snug, pbns = (random_model(kind, dressed, [motion], seed=0) for kind in ("snug", "pbns"))
     other = TrainedModel("snug", make_network("snug", 154, 7, DEFAULT, seed=0), DEFAULT)
     for model, moved, message in (
         (other, motion, "7 vertices, the garment 150"),

@@ -16,12 +16,10 @@ from snug.garments.templates import find_template
 from snug.kinds import KINDS
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
-from snug.networks.trained_model import TrainedModel, digest_triangles
 from snug.recipe import DEFAULT, Recipe
 from snug.training.contact_cache import PARTS, Patch
-from snug.training.optimisation_step import Trainer, start_network
+from snug.training.optimisation_step import Trainer
 from snug.training.train_network import train_network
-from snug.training.training_set import TrainingSet
 
 AROUND, RINGS = 15, 10
 PLAIN = replace(DEFAULT, mixed=0.0)
@@ -122,14 +120,7 @@ def short(kind: str = "snug", *, motions=None, dressed=None, recipe: Recipe = PL
     return train_network(kind, dressed or tube_dress(), motions, recipe=recipe, **options)
 
 
-def untrained_model(kind: str, dressed: DressedBody, motions, *, seed: int, recipe: Recipe | None = None):
-    """A network before any step, with a random last layer; with the recipe's, of zeros, it is skinning."""
-    how = KINDS[kind]
-    recipe = replace(recipe or how.recipe, zero_last_layer=False)
-    options = {"features": how.network.feature_set, "sequences": how.network.sequential}
-    data = TrainingSet(dressed, motions, recipe, **options)
-    network = start_network(kind, data, seed=seed).eval()
-    triangles = digest_triangles(dressed.garment.faces)
-    return TrainedModel(
-        kind, network, recipe, seed=seed, unit=how.unit, fps=1.0 / data.dt, triangles=triangles
-    )
+def random_model(kind: str, dressed: DressedBody, motions, *, seed: int, recipe: Recipe | None = None):
+    """A network after one step from a random last layer; from the recipe's, of zeros, it is skinning."""
+    recipe = replace(recipe or KINDS[kind].recipe, zero_last_layer=False)
+    return short(kind, motions=motions, dressed=dressed, recipe=recipe, seed=seed, steps=1)

@@ -13,7 +13,7 @@ from snug.networks.trained_model import ModelFileError, TrainedModel
 from snug.recipe import DEFAULT
 from snug.train import choose_motions, main, parse_options
 from snug.training.augmentation import augment
-from tests.snug.training.dressing import PLAIN, make_trainer, short, swaying, tube_dress, untrained_model
+from tests.snug.training.dressing import PLAIN, make_trainer, random_model, short, swaying, tube_dress
 
 
 @pytest.mark.parametrize(
@@ -56,7 +56,7 @@ def test_files_that_are_no_models_are_named(tmp_path, monkeypatch):
     foreign, old = (tmp_path / f"{name}.safetensors" for name in ("foreign", "old"))
     save_file({"a": torch.zeros(2)}, foreign)
     monkeypatch.setattr(trained_model, "MODEL_FORMAT", "snug-model-5")
-    untrained_model("pbns", tube_dress(), [swaying()], seed=0).save(old)
+    random_model("pbns", tube_dress(), [swaying()], seed=0).save(old)
     monkeypatch.undo()
     with pytest.raises(ModelFileError, match="no model of this project"):
         TrainedModel.load(foreign)
