@@ -28,23 +28,17 @@ import numpy as np
 Record = dict[str, dict[str, str]]  # name of a result -> field -> its value as text
 
 # What may be called otherwise in another version: options of a run, places that a name is imported from.
-# Of several the first is taken that the checkout knows, so that one table serves both versions.
+# Of several the first one is used that the checkout knows, so that one table serves both versions.
 FURTHER = "simulation,santesteban2019,tailornet,handles-80,ncs,pbns-springs,snug+cleanup,snug-window6"
 UNSEEN = "tshirt/01_01_a,tshirt/dance_turn,tshirt/push_recovery"
-SMOKE = ("smoke", "--preset smoke")
+PACKAGED = "skinning,snug-packaged,pbns-packaged,supervised-packaged"
 RUNS = {
-    "smoke": SMOKE,
-    "networks": tuple(f"{smoke} --scenes tshirt/01_01_a --methods {FURTHER}" for smoke in SMOKE),
-    "packaged": tuple(
-        f"--trained {frames} --scenes {UNSEEN} --methods skinning,snug,pbns,supervised"
-        for frames in ("--set sizes.frames=20", "--frames 20")
-    ),
+    "smoke": ("smoke",),
+    "networks": (f"smoke --scenes tshirt/01_01_a --methods {FURTHER}",),
+    "packaged": (f"full:garments --set sizes.frames=20 --scenes {UNSEEN} --methods {PACKAGED}",),
 }
 PLACES = {
-    "trainings": (
-        "benchmarks.methods.catalogue.trainings:TRAININGS",
-        "benchmarks.methods.declared_networks:TRAININGS",
-    ),
+    "trainings": ("benchmarks.methods.declared_networks:TRAININGS",),
     "trajectory": ("reference_sim.trajectory:Trajectory",),
     "template": ("snug.garments.templates:find_template",),
     "motion": ("snug.motion.library:make_motion",),
