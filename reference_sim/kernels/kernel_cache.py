@@ -69,7 +69,7 @@ def njit(**options: Any) -> Callable[[Any], Any]:
         finally:
             _config.CACHE_LOCATOR_CLASSES = locators
         if folder:
-            kernel.compile = _guard(kernel.compile, folder / f"{function.__qualname__}.lock")
+            _guard(kernel, folder / f"{function.__qualname__}.lock")
         return kernel
 
     return decorate
@@ -91,14 +91,17 @@ class KernelLocator(InTreeCacheLocator):
         return _digests[self._module]
 
 
-def _guard(compile_kernel: Callable[[Any], Any], lock: Path) -> Callable[[Any], Any]:
-    """Return the compilation of a kernel, for which other processes wait."""
+def _guard(kernel: Any, lock: Path) -> None:
+    """Let other processes wait while this one compiles the kernel."""
+    compile_kernel = kernel.compile
 
     def compile_alone(signature: Any) -> Any:
+        if signature in kernel.overloads:  # as in each step of a sweep: nothing is left to compile
+            return compile_kernel(signature)
         with FileLock(lock):  # a new one each time: a fork would keep it
             return compile_kernel(signature)
 
-    return compile_alone
+    kernel.compile = compile_alone
 
 
 def _digest(function: Any) -> str:
