@@ -144,11 +144,12 @@ def test_a_method_a_scene_and_a_metric_of_the_examples_run_together(user, tmp_pa
         judge(title, tmp_path)
 
 
-def test_the_lines_of_python_in_the_readme_run(tmp_path, monkeypatch):
+def test_the_lines_of_python_in_the_readme_print_what_it_says(tmp_path, monkeypatch, capsys):
     readme = (ROOT / "README.md").read_text(encoding="utf-8")
     (code,) = [text for _, language, text in blocks(readme) if language == "python"]
     monkeypatch.chdir(tmp_path)
     exec(smaller(code), {"__name__": "__main__"})
+    assert capsys.readouterr().out == code.rpartition("# ")[2]
 
 
 @pytest.mark.slow
