@@ -108,7 +108,8 @@ def _bending(x, hinges, stiffness, rest, values, gradients):
             for corner in range(4):
                 for axis in range(3):
                     add_lanes(u, 3 * corner + axis, gradients, 3 * (first + hinges[h, corner]) + axis)
-        values[block] = total
+        for n in range(L):  # a whole row would compile numba's message on shapes: a second
+            values[block, n] = total[n]
 
 
 def lanes(term: BendHinge) -> Float32Lanes:

@@ -24,6 +24,7 @@ import numpy as np
 
 from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy, Step, demand_positive
+from reference_sim.geometry.topology import corner_heights
 
 if TYPE_CHECKING:
     import scipy.sparse as sp
@@ -184,9 +185,7 @@ class ContactBarrier(Energy):
 
 def _check_heights(cloth: Cloth, distance: float) -> None:
     """Raise ValueError where a barrier reaches across a triangle: it would push the resting cloth apart."""
-    corners = cloth.rest_corners
-    edges = np.linalg.norm(np.roll(corners, 1, axis=1) - corners, axis=2)
-    heights = 2 * cloth.areas / edges.max(axis=1)
+    heights = corner_heights(cloth.rest_corners)
     face = int(np.argmin(heights))
     if heights[face] <= distance:
         raise ValueError(

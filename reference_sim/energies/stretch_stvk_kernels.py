@@ -154,7 +154,8 @@ def _strain(x, faces, Dm_inverse, areas, lam, mu, values, gradients):
             for corner in range(3):
                 for axis in range(3):
                     add_lanes(u, 3 * corner + axis, gradients, 3 * (first + faces[f, corner]) + axis)
-        values[block] = total
+        for n in range(L):  # a whole row would compile numba's message on shapes: a second
+            values[block, n] = total[n]
 
 
 @njit(cache=True, inline="always")

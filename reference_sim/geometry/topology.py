@@ -50,6 +50,12 @@ def corner_areas(corners: Array) -> Array:
     return 0.5 * np.linalg.norm(np.cross(first, second), axis=1)
 
 
+def corner_heights(corners: Array) -> Array:
+    """Return the least heights (F,) [m] of triangles of corners (F, 3, 3) [m]."""
+    edges = np.linalg.norm(np.roll(corners, 1, axis=1) - corners, axis=2)
+    return 2 * corner_areas(corners) / np.maximum(edges.max(axis=1), np.finfo(float).tiny)
+
+
 def corner_angles(points: Array, faces: Index) -> Array:
     """Return the angles (F,3) [rad] at the corners of the faces (F,3) between points (V,3) [m]."""
     after, before = (points[np.roll(faces, -k, axis=1)] - points[faces] for k in (1, 2))

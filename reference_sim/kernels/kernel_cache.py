@@ -16,6 +16,7 @@ keeps on disk is found again by another process.
 from __future__ import annotations
 
 import contextlib
+import gc
 import hashlib
 import os
 import tempfile
@@ -98,8 +99,14 @@ def _guard(kernel: Any, lock: Path) -> None:
     def compile_alone(signature: Any) -> Any:
         if signature in kernel.overloads:  # as in each step of a sweep: nothing is left to compile
             return compile_kernel(signature)
-        with FileLock(lock):  # a new one each time: a fork would keep it
-            return compile_kernel(signature)
+        collects = gc.isenabled()
+        gc.disable()  # circular garbage: to look for it takes a sixth of the time
+        try:
+            with FileLock(lock):  # a new one each time: a fork would keep it
+                return compile_kernel(signature)
+        finally:
+            if collects:
+                gc.enable()
 
     kernel.compile = compile_alone
 

@@ -19,6 +19,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from reference_sim.cloth import Cloth
+from reference_sim.geometry.topology import corner_heights
 from reference_sim.minimise.descent import (
     TOLERANCE,
     Descent,
@@ -41,6 +43,7 @@ WATCHDOG_AFTER = 20  # iterations: most steps of a garment are done by then, and
 WATCHDOG_STEPS = 40  # full steps in a row before the energy has to be below its start
 PREDICTED = 0.9  # share of the predicted decrease from which on the quadratic model needs no help
 RESIDUAL_ROUND_OFF = 1e-2  # relative residual that round-off may excuse at most
+COLLAPSED = 1e-6  # [m] height of a triangle that is taken for a line
 REUSE_MEMORY = 20  # steps that correct a factorisation used again
 # It is given up where so many steps do not bring the gradient down to this share.
 REUSE_WINDOW, REUSE_RATE = 8, 0.5
@@ -87,8 +90,13 @@ class Newton:
             result = run.result(iterate(self, run))
         finally:
             self.potential.forget()
-        problem = self.potential.infeasibility(result.positions)
-        return replace(result, status="diverged", reason=problem) if problem else result
+        if problem := self.potential.infeasibility(result.positions):
+            return replace(result, status="diverged", reason=problem)
+        if result.status == "converged":
+            return result
+        return replace(
+            result, reason=result.reason + _find_collapse(self.potential.cloth, result.positions)
+        )
 
     def terminate(self, run: NewtonRun) -> Stop | None:
         """Let the true Hessian decide where the gradient is small; otherwise assemble the next step's."""
@@ -266,3 +274,13 @@ class NewtonRun(Descent):
             else:
                 shift = max(4 * shift, 1.0)
         return False
+
+
+def _find_collapse(cloth: Cloth, x: np.ndarray) -> str:
+    """Name the face that is a line at x (V, 3) [m], where bending has no derivative; empty if none is."""
+    heights = corner_heights(x[cloth.faces])
+    face = int(np.argmin(heights))
+    if not heights[face] <= COLLAPSED:  # nor is one that is not finite
+        return ""
+    at_rest = corner_heights(cloth.rest_corners)[face]
+    return f": face {face}, {at_rest:.2g} m high at rest, has become a line; use a mesh without slivers"

@@ -147,3 +147,16 @@ def test_the_two_loop_recursion_is_the_update_of_a_dense_matrix(memory):
     assert history.direction(g, lambda q: q / first) == pytest.approx(-H @ g, rel=1e-12, abs=1e-12)
     history.clear()
     assert history.direction(g, lambda q: q / first) == pytest.approx(-g / first, rel=1e-15)
+
+
+def test_a_triangle_that_collapses_is_named():
+    """A vertex 10 um inside an edge that is pinned is pushed across it."""
+    x = 0.01 * np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0.5, 1e-3, 0]])
+    cloth = Cloth(x, np.array([[0, 1, 4], [1, 2, 4], [2, 3, 4], [3, 0, 4]]), pins=[0, 1, 2, 3])
+    start = x.copy()
+    start[2:4, 1] *= 0.6
+    start[4, 2] = 1e-5
+    result = minimise(Potential([StretchStVK(cloth), BendHinge(cloth)]), start, method="newton")
+    assert (
+        result.status == "max_iterations" and "face 0, 1e-05 m high at rest, has become" in result.reason
+    )
