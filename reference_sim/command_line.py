@@ -109,7 +109,7 @@ def announce_compilation() -> None:
             "kernels are compiled in about half a minute, in each process anew, for nothing can be kept in "
             f"{' or '.join(map(str, folders))}: set NUMBA_CACHE_DIR to a folder that can be written"
         )
-    elif writable != folders:
+    elif writable[0] != folders[0]:
         message += f", and kept in {writable[0]}: {folders[0]} is read-only"
     print(message, file=sys.stderr)
 

@@ -29,7 +29,7 @@ def read_toml(path: str | Path) -> dict[str, Any]:
     path = demand_file(path)
     if (size := path.stat().st_size) > LARGEST:
         raise ValueError(f"{size} bytes: at most {LARGEST} are read")
-    table = parse_toml(path.read_text(encoding="utf-8"))
+    table = parse_toml(path.read_text(encoding="utf-8-sig"))
     if not table:
         raise ValueError("holds no field")
     return table

@@ -230,6 +230,7 @@ class Potential:
 
     def terms(self, x: np.ndarray) -> dict[str, float]:
         """Return the energy of each term [J] at x (V, 3) [m], by name."""
+        x = self._check(x)
         return {energy.name: energy.value_and_gradient(x)[0] for energy in self.energies}
 
     def value(self, x: np.ndarray) -> float:
@@ -242,13 +243,20 @@ class Potential:
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return both at once [J], [N]: they share most of their work."""
-        x = np.ascontiguousarray(x, dtype=np.float64)
+        x = self._check(x)
         total, gradient = 0.0, np.zeros_like(x)
         for energy in self.energies:
             value, part = energy.value_and_gradient(x)
             total += value
             gradient += part
         return total, gradient
+
+    def _check(self, x: np.ndarray) -> np.ndarray:
+        """Return positions as the kernels read them, without bounds; raises ValueError for another shape."""
+        x = np.ascontiguousarray(x, dtype=np.float64)
+        if x.shape != (expected := (self.cloth.vertex_count, 3)):
+            raise ValueError(f"positions have shape {x.shape}: expected {expected} [m]")
+        return x
 
     def largest_step(self, x: np.ndarray, direction: np.ndarray) -> float:
         """Return the largest share of `direction` (V, 3) [m] that every term allows from x (V, 3)."""
@@ -279,7 +287,7 @@ class Potential:
 
     def hessian(self, x: np.ndarray) -> sp.csc_matrix:
         """Return second derivatives (3V, 3V) [N/m] at x (V, 3) [m], coordinates of a vertex side by side."""
-        x = np.ascontiguousarray(x, dtype=np.float64)
+        x = self._check(x)
         pattern = self.pattern(np.ones(self.cloth.vertex_count, dtype=bool))
         changing = pattern.hessians(x)
         pattern = pattern.widen(changing)

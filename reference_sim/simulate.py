@@ -9,6 +9,7 @@ import argparse
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -77,6 +78,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     path: Path = options.out
     if path.suffix.lower() != ".vtkhdf" or path.exists() or not path.parent.is_dir():
         raise ValueError(f"{path}: name a new file that ends in .vtkhdf, in a folder that exists")
+    if options.self_contact and find_spec("ipctk") is None:
+        raise ValueError("--self-contact: needs the package ipctk: pip install ipctk")
+    if options.obstacle_rest and not options.obstacle:
+        raise ValueError(
+            f"--obstacle-rest {options.obstacle_rest}: is a pose of an obstacle: add --obstacle"
+        )
     from reference_sim import energies
     from reference_sim.time_loop import simulate
 
@@ -119,7 +126,7 @@ def read_cloth(options: argparse.Namespace) -> Cloth:
     try:
         refuse_too_many(len(positions))
         if options.weld:
-            surface, _ = join_seams(replace(surface, positions=positions), options.weld)
+            surface = join_seams(replace(surface, positions=positions), options.weld)
             positions = surface.positions
         return Cloth(positions, surface.faces, material, pins=choose_pins(options.pins, positions))
     except MeshError as error:
@@ -132,6 +139,10 @@ def choose_pins(choice: str | None, positions: np.ndarray) -> list[int]:
         return []
     if choice == "top":
         height = positions[:, 1]
+        if height.min() == height.max():
+            raise ValueError(
+                "--pins top: the mesh is level, all of it is its top: give --up, or vertices as '0,9'"
+            )
         return (height >= height.max() - 0.01 * (height.max() - height.min())).nonzero()[0].tolist()
     numbers = [word.strip() for word in choice.split(",")]
     if not all(word.isdecimal() and int(word) < len(positions) for word in numbers):

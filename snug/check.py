@@ -21,7 +21,7 @@ EXAMPLES = """examples:
   python -m snug.check shirt.obj,units=cm,up=z
   python -m snug.check shirt.obj,rest=uv                      its UV chart as rest shape
 
-exit status: 0 all can be used, 1 one cannot"""
+exit status: 0 all can be used, 1 one cannot, 2 bad words or body"""
 
 
 def make_parser() -> argparse.ArgumentParser:

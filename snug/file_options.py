@@ -53,6 +53,7 @@ class GarmentFile:
     weld: float = 1e-6
 
     def __post_init__(self) -> None:
+        object.__setattr__(self, "path", Path(self.path))
         for name, choices in (("units", UNITS), ("up", AXES), ("rest", REST_SHAPES)):
             _demand_one_of(choices, name, getattr(self, name))
         if len(self.shift) != 3 or not all(map(_is_number, self.shift)):

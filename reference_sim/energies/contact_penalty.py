@@ -195,7 +195,7 @@ def _solve(data, x, w):
     stencils, shares, stiffness, margin, points, normals, force = data
     for e in range(len(stencils)):
         d = sample_depth(x, stencils[e], shares[e], margin, points[e], normals[e])
-        if d > 0.0 or force[e] != 0.0:
+        if (d > 0.0 or force[e] != 0.0) and stiffness[e] > 0.0:
             compliance = 1.0 / (2.0 * stiffness[e])
             slope = -1.5 * np.sqrt(d)  # of C along the normal
             total = compliance

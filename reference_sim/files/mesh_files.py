@@ -198,27 +198,34 @@ LARGEST_STRETCH = 1.5  # from chart to mesh, or its inverse: no cloth is sewn so
 STRETCHED_SHARE = 0.1  # of the area, from which a chart is no pattern
 
 
-def join_seams(surface: Surface, distance: float = JOIN_DISTANCE) -> tuple[Surface, np.ndarray]:
+def join_seams(surface: Surface, distance: float = JOIN_DISTANCE) -> Surface:
     """Join the doubled vertices of a surface in metres: those closer than the distance [m] are one.
 
-    The number in the file of each vertex left (V,) comes second.
+    Raises MeshError for a distance that is not above 0, or that a triangle does not survive.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
+    if not 0.0 < distance < np.inf:
+        raise MeshError(f"weld={distance}: give a distance above 0 [m]")
     count = len(surface.positions)
     pairs = cKDTree(surface.positions).query_pairs(distance, output_type="ndarray")
     if not len(pairs):
-        return surface, np.arange(count)
+        return surface
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     of_vertex = connected_components(graph, directed=False)[1]
     _, firsts = np.unique(of_vertex, return_index=True)
     ids = np.sort(firsts)
     place = np.empty(count, dtype=np.int64)
     place[of_vertex[ids]] = np.arange(len(ids))
-    joined = replace(surface, positions=surface.positions[ids], faces=place[of_vertex][surface.faces])
-    return joined, ids
+    faces = place[of_vertex][surface.faces]
+    if (lost := (faces == np.roll(faces, 1, axis=1)).any(axis=1)).any():
+        raise MeshError(
+            f"joining vertices within {distance:g} m makes a line of triangle {lost.argmax()}: weld by less, "
+            "or remove the triangle"
+        )
+    return replace(surface, positions=surface.positions[ids], faces=faces)
 
 
 def rest_chart(surface: Surface, scale: float) -> np.ndarray:

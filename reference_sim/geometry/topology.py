@@ -51,7 +51,7 @@ def corner_areas(corners: Array) -> Array:
 
 
 def corner_heights(corners: Array) -> Array:
-    """Return the least heights (F,) [m] of triangles of corners (F, 3, 3) [m]."""
+    """Return the least heights (F,) [m] of triangles by their corners, as for `corner_areas`."""
     edges = np.linalg.norm(np.roll(corners, 1, axis=1) - corners, axis=2)
     return 2 * corner_areas(corners) / np.maximum(edges.max(axis=1), np.finfo(float).tiny)
 

@@ -6,7 +6,7 @@ Kavan 2017). It is factorised once per minimisation and costs three triangular s
 first hundredth of the gap comes several times sooner than with Newton; the last digits do not. So Newton
 takes over where the relative residual is SWITCH, and its factorisations serve several steps each.
 
-What comes before Newton needs no more than float32. So it is compiled.CompiledLBFGS, where that has
+What comes before Newton needs no more than float32. So it is compiled_lbfgs.CompiledLBFGS, where that has
 kernels for all terms, and goes on to COMPILED_SWITCH.
 """
 

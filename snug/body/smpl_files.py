@@ -211,8 +211,8 @@ def _faces(arrays: Arrays, template: np.ndarray) -> np.ndarray:
     if faces.ndim != 2 or faces.shape[1] != 3 or faces.dtype.kind not in "iu" or faces.size == 0:
         raise BodyError(f"f is {faces.dtype} {faces.shape}; expected vertex indices of shape (any, 3)")
     faces = faces.astype(np.int64)
-    if faces.min() < 0 or faces.max() >= len(template):
-        raise BodyError(f"f names vertex {faces.max()}; the body has {len(template)}")
+    if (wrong := faces[(faces < 0) | (faces >= len(template))]).size:
+        raise BodyError(f"f names vertex {wrong[0]}; the body has {len(template)}")
     try:
         for loop in boundary_loops(faces):
             around = np.linalg.norm(template[loop] - template[np.roll(loop, 1)], axis=1).sum()

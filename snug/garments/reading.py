@@ -84,7 +84,7 @@ def _make_garment(file: GarmentFile, body: Body, raw: Surface, material: Materia
     """Return the garment of a surface as it is in the file. Raises ValueError: problem, remedy."""
     refuse_too_many(len(raw.positions))
     positions = to_metres_y_up(raw.positions, units=file.units, up=file.up) + np.asarray(file.shift)
-    surface, _ = join_seams(replace(raw, positions=positions), file.weld)
+    surface = join_seams(replace(raw, positions=positions), file.weld)
     skin = Obstacle(body.template, body.faces)
     _check_place(file, body, skin, raw)
     chart = None
@@ -129,7 +129,7 @@ def _check_place(file: GarmentFile, body: Body, skin: Obstacle, raw: Surface) ->
     remedy = "move it onto the unposed body, facing +z with y up"
     if fitting:
         units, up = min(fitting, key=fitting.__getitem__)
-        remedy = f"give '{file.path.name},units={units},up={up}'"
+        remedy = f"give units={units},up={up} behind its path"
     raise ValueError(f"does not lie on the body ({size} m, {problem}): {remedy}")
 
 

@@ -48,7 +48,7 @@ def parse_lines(
     try:
         if demand_file(path).stat().st_size > MAX_TEXT_BYTES:
             raise MotionError(f"larger than {MAX_TEXT_BYTES >> 20} MB; cut the clip")
-        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+        lines = path.read_text(encoding="utf-8-sig", errors="replace").splitlines()
     except OSError as problem:
         raise MotionError(f"cannot be read ({problem.strerror or problem}); check the path") from None
     unread = iter(lines)

@@ -37,9 +37,7 @@ class FramePlan:
     order: vertices (V,) as they are skinned; padded: their number, filled up to whole blocks.
     """
 
-    def __init__(
-        self, order: np.ndarray, padded: int, *, pins: Sequence[int] = (), scale: float = 1.0
-    ) -> None:
+    def __init__(self, order: np.ndarray, padded: int, *, pins: Sequence[int], scale: float) -> None:
         self._used, self._scale = 0, scale
         self._places = np.full(padded, len(order))
         self._places[: len(order)] = order
@@ -96,7 +94,8 @@ class FramePlan:
 
     def add_offsets(self, *parts: tuple[nn.Linear, slice]) -> None:
         """Add the offsets (3 V,), the sum of linear layers of the numbers at places; to be called last."""
-        rows = self._rows()
+        # The offset of the network that each of the frame's is; 3 V to 3 V + 2 for none.
+        rows = (3 * self._free + np.arange(3)[:, None]).ravel()
         for kind, (layer, x) in zip((PRODUCT, *[ADDED] * len(parts)), parts):
             matrix, bias = _numbers_of(layer)
             matrix, bias = np.pad(matrix, ((0, 3), (0, 0)))[rows], np.pad(bias, (0, 3))[rows]
@@ -119,10 +118,6 @@ class FramePlan:
                 numbers = x.start + 4 * handle
                 self._operations.append((kind, padded, 4 * count, 0, terms, numbers, target))
                 self._terms.append(np.ascontiguousarray(part[:, handle].T).ravel())
-
-    def _rows(self) -> np.ndarray:
-        """Return the offset of the network that each of the frame's is; 3 V to 3 V + 2 for none."""
-        return (3 * self._free + np.arange(3)[:, None]).ravel()
 
     def _place(self, size: int) -> slice:
         """Reserve a place for `size` numbers; those behind stay zero: matrices are read in whole vectors."""

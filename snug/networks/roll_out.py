@@ -68,9 +68,7 @@ def roll_out(
     with torch.inference_mode():  # all frames as a batch
         for _ in range(QUASI_STATIC_FRAMES if model.network.sequential else 1):
             offsets, state = model.network(features, state)
-        unposed, weights = dressed.rest(betas) + offsets[:, 0], dressed.weights(model.recipe.smoothing)
-        posed = skin(unposed, weights, dressed.transforms(motion.poses, betas)).numpy()
-    positions = posed.astype(np.float64) + dressed.pelvis(motion, betas)[:, None]
+        positions = dressed.skin(motion, betas, smoothing=model.recipe.smoothing, offsets=offsets[:, 0])
     return _trajectory(model, dressed, motion, positions, np.arange(motion.frames), np.empty(0))
 
 
@@ -160,13 +158,12 @@ class CompiledFrame:
         order, *joints = blocks_of_vertices(weights.numpy())
         unposed = np.zeros((3, VERTEX_BLOCK * (len(joints[0]) - 1)), np.float32)
         unposed[:, : len(order)] = rest.numpy()[order].T
-        plan = FramePlan(order, unposed.shape[1])
+        self._skinning = unposed, *joints, order
+        self._operations, self._size = None, unposed.size
         if network is not None:
             plan = FramePlan(order, unposed.shape[1], pins=network.pins, scale=network.output_scale)
             network.lay_out(plan, plan.add_normalised(network.input_mean, network.input_std))
-        self._operations = None if network is None else plan.operations()
-        self._skinning = unposed, *joints, order
-        self._size = plan.size
+            self._operations, self._size = plan.operations(), plan.size
 
     def start(self) -> np.ndarray:
         """Return a fresh working array, whose state is zero."""

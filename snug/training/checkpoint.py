@@ -88,8 +88,10 @@ def describe_run(trainer: Trainer, **facts: Any) -> dict[str, Any]:
         "recipe": trainer.recipe.as_dict() | {"terms": list(trainer.recipe.terms)},
         "seed": trainer.seed,
         "steps": trainer.steps,
-        # They change the order of sums, and so the last bits.
+        # These change the order of sums, and so the last bits.
         "threads": torch.get_num_threads(),
+        "device": trainer.device.type,
+        "kernels": trainer.kernels,
         "vertices": trainer.dressed.vertices,
         "data": digest.hexdigest(),
         "material": asdict(trainer.dressed.cloth.material),

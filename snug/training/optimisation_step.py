@@ -290,8 +290,7 @@ class Trainer:
         self.order = tensors["order"].numpy()
         self.noise.set_state(tensors["noise"])
         for name, parameter in self.network.named_parameters():
-            prefix = f"adam.{name}."
-            moments = {n.removeprefix(prefix): t for n, t in tensors.items() if n.startswith(prefix)}
+            moments = select_tensors(tensors, f"adam.{name}")
             self.optimiser.state[parameter] = {
                 key: tensor.to(self.device) for key, tensor in moments.items()
             }

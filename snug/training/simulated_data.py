@@ -137,11 +137,6 @@ SMOOTHING_SHARE = 0.15  # of the way to the neighbours' mean, in one sweep
 SMOOTHING_SWEEPS = 80  # at 1000 vertices
 
 
-def vertex_loss(x: Tensor, target: Tensor) -> Tensor:
-    """Return the mean squared distance (N, T) [cm^2] of vertices (N, T, V, 3) [m] from their targets."""
-    return CM2_PER_M2 * (x - target).square().sum(-1).mean(-1)
-
-
 def band_loss(predicted: Tensor, target: Tensor) -> Tensor:
     """Return the mean L1 distance (N, T) [cm] of one band, (N, T, V, 3) [m], from its target."""
     return CM_PER_M * (predicted - target).abs().sum(-1).mean(-1)
@@ -177,8 +172,9 @@ class VertexTargets:
         return self.distances(x, batch)
 
     def distances(self, x: Tensor, batch: Batch) -> dict[str, Tensor]:
-        """Return the loss of predicted vertices x (N, T, V, 3) [m], name -> (N, T) [cm^2]."""
-        return {"vertices": vertex_loss(x, self.vertices[torch.as_tensor(batch.frames)])}
+        """Return the mean squared distance of vertices x (N, T, V, 3) [m], name -> (N, T) [cm^2]."""
+        missed = x - self.vertices[torch.as_tensor(batch.frames)]
+        return {"vertices": CM2_PER_M2 * missed.square().sum(-1).mean(-1)}
 
 
 class BandTargets(VertexTargets):

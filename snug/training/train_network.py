@@ -138,7 +138,6 @@ def train_network(
     seed: int,
     trajectories: Trajectories | None = None,
     recipe: Recipe | None = None,
-    log: Callable[[dict[str, float]], None] | None = None,
     progress: bool = True,
     every: int = 50,
     device: str = "cpu",
@@ -157,7 +156,6 @@ def train_network(
         trajectories: for kinds that learn from a simulation, motion name -> simulated world vertices
             (T, V, 3) [m].
         recipe: options of network and training; None: those of the kind.
-        log: called with each row of the history, every `every` steps.
         progress: whether a bar is shown on standard error.
         every: steps between two rows of the history.
         device: `cpu` or `cuda`, for the whole step.
@@ -180,7 +178,7 @@ def train_network(
         device=on, kernels=kernels,
     )  # fmt: skip
     loop = TrainingLoop(
-        trainer, log=log, progress=progress, every=every, checkpoint=checkpoint,
+        trainer, progress=progress, every=every, checkpoint=checkpoint,
         setup_seconds=time.perf_counter() - start,
     )  # fmt: skip
     return loop.run()

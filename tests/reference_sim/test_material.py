@@ -17,7 +17,7 @@ def test_the_default_cotton_is_that_of_later_methods():
 
 def test_a_file_gives_its_fields_and_the_defaults_of_the_others(tmp_path):
     path = tmp_path / "silk.toml"
-    path.write_text("young_modulus = 5e4  # Pa\ndensity = 300\n")
+    path.write_text("young_modulus = 5e4  # Pa\ndensity = 300\n", encoding="utf-8-sig")  # as Notepad does
     assert Material.from_file(path) == Material(young_modulus=5e4, density=300)
 
 

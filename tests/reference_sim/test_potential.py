@@ -83,6 +83,14 @@ def test_the_scalar_pattern_is_the_sum_of_scalar_stiffnesses():
     assert np.abs(assembled - expected).max() < 1e-13 * np.abs(expected).max()
 
 
+@pytest.mark.parametrize("ask", ["terms", "value", "gradient", "hessian"])
+def test_positions_of_another_mesh_are_refused(ask):
+    """The compiled kernels look at no bounds."""
+    _, terms, x = all_terms()
+    with pytest.raises(ValueError, match=r"shape \(3, 3\): expected"):
+        getattr(Potential(terms), ask)(x[:3])
+
+
 @pytest.mark.parametrize(
     ("terms", "message"),
     [

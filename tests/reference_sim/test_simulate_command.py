@@ -60,7 +60,7 @@ def test_triangles_apart_are_refused_and_hang_as_one_sheet_once_they_are_welded(
     write_obj(tmp_path / "soup.obj", SHEET[FACES].reshape(-1, 3), np.arange(FACES.size).reshape(-1, 3))
     assert simulate("soup.obj -o soup.vtkhdf") == 2 and "merge" in capsys.readouterr().err
     for mesh in ("sheet.obj", "soup.obj --weld 0.0002"):
-        assert simulate(f"{mesh} --pins top --frames 3 -o {mesh[:4]}.vtkhdf") == 0
+        assert simulate(f"{mesh} --up z --pins top --frames 3 -o {mesh[:4]}.vtkhdf") == 0
     positions = (Trajectory.load(f"{name}.vtkhdf").positions for name in ("shee", "soup"))
     sheet, welded = (x[:, np.lexsort(x[0].T.round(6))] for x in positions)
     np.testing.assert_allclose(welded, sheet, atol=1e-9)
@@ -81,6 +81,10 @@ def test_pins_ride_on_an_obstacle_that_moves_below_them_and_stay_elsewhere(simul
         ("sheet.obj -o a.obj", "a.obj: name a new file that ends in .vtkhdf, in a folder that exists"),
         ("sheet.obj --obstacle ball --obstacle-rest sheet.obj -o a.vtkhdf", "export both from one mesh"),
         ("sheet.obj --obstacle sheet.obj -o a.vtkhdf", "sheet.obj: obstacle is not closed"),
+        ("sheet.obj --obstacle-rest sheet.obj -o a.vtkhdf", "is a pose of an obstacle: add --obstacle"),
+        ("sheet.obj --pins top -o a.vtkhdf", "--pins top: the mesh is level, all of it is its top"),
+        ("sheet.obj --weld 0.5 -o a.vtkhdf", "makes a line of triangle 0: weld by less"),
+        ("sheet.obj --weld nan -o a.vtkhdf", "weld=nan: give a distance above 0"),
     ],
 )  # fmt: skip
 def test_bad_input_ends_in_one_line_and_writes_nothing(simulate, capsys, tmp_path, words, message):

@@ -117,6 +117,12 @@ def test_xpbd_finds_the_minimum_where_its_constraints_are_linear_and_nearly_else
     assert gaps[0] > gaps[1] > gaps[2] and 1e-6 < gaps[2] < 0.2
 
 
+def test_a_contact_without_stiffness_pushes_nothing_in_xpbd():
+    potential, guess = pressed(cells=4)
+    next(term for term in potential.energies if term.name == "collision").stiffness[:] = 0.0
+    assert np.isfinite(XPBD(potential, max_iterations=2).minimise(guess).positions).all()
+
+
 @pytest.mark.parametrize("method", [VertexBlockDescent, XPBD])
 def test_weight_alone_is_one_sweep_to_the_exact_fall(method):
     positions, faces = square_sheet(3, 0.2)

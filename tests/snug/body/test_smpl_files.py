@@ -212,10 +212,11 @@ BEFORE = 0.11 * np.outer(np.arange(24) == JOINT["left_wrist"], [0, 0, 1])
         (changed("kintree_table", lambda t: np.full((2, 24), 30)), "hangs on 30"),
         (without_feet, "a hole at vertex"),
         (changed("f", lambda f: f[:, ::-1]), "inside out"),
+        (changed("f", lambda f: np.where(f == 5, -1, f.astype(int))), "f names vertex -1"),
         (changed("joints", lambda j: j + ANKLE, "plain"), "left leg is 10 degrees off the T pose"),
         (changed("joints", lambda j: j + BEFORE, "plain"), "left arm is 13 degrees off the T pose"),
     ],
-    ids=range(10),
+    ids=range(11),
 )
 def test_a_broken_body_is_refused_in_one_line(layouts, tmp_path, change, says):
     path = saved(tmp_path / "broken.npz", change(layouts))

@@ -13,7 +13,8 @@ WALK = make_motion("walk").cut(20, 40)
 
 
 def written(path, text=None, **options):
-    path.write_text(text if text is not None else bvh(WALK.poses, WALK.translations, 30.0, **options))
+    text = text if text is not None else bvh(WALK.poses, WALK.translations, 30.0, **options)
+    path.write_text(text, encoding="utf-8-sig")  # with the mark that some programs begin a file with
     return path
 
 

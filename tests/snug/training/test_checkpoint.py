@@ -122,6 +122,7 @@ STIFF = replace(DRESSED.garment, material=Material(young_modulus=1e6))
         ("snug", {"dressed": DressedBody(DRESSED.body, STIFF)}, (), "another material"),
         ("supervised", {"trajectories": {"sway": DRESSED.skin(swaying(30))}}, (), "another data"),
         ("snug", {}, (torch, "get_num_threads", lambda: 7), "another threads"),
+        ("snug", {"kernels": False}, (), "another kernels"),
         (
             "snug",
             {},
