@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import sys
 import tempfile
 import time
@@ -132,6 +133,10 @@ def faults_of(plan: Plan) -> Iterator[tuple[str, str]]:
         outcomes = [runner.outcomes.get(id, Outcome()) for id in ids]
         reasons = (o.reason for o in outcomes if o.failed or o.status == "failed")
         fault = next(reasons, "").removeprefix(f"{ContractError.__name__}: ")
+        measured = outcomes[2].result if outcomes[2].status == "ok" else {}
+        values = {n: v[0] if isinstance(v, (tuple, list)) else v for n, v in measured.items()}
+        if not fault and (lost := [name for name, value in values.items() if not math.isfinite(value)]):
+            fault = f"{lost[0]} is not finite: leave it out where it does not apply"
         own_scene = cell.scene.declared_in and not cell.entry.declared_in
         name = cell.method if cell.entry.declared_in else "".join(plan.metrics)
         yield cell.scene.name if own_scene else f"{name} in {cell.scene.name}", fault

@@ -47,8 +47,13 @@ def by_name(kind: str, entries: Iterable[Entry]) -> dict[str, Entry]:
     for entry in entries:
         if entry.name in index:
             both = (index[entry.name], entry)
-            homes = " and by ".join(getattr(e, "declared_in", "") or "the project itself" for e in both)
-            raise DeclarationError(f"{kind} '{entry.name}' is declared twice, by {homes}: rename one")
+            homes = [getattr(e, "declared_in", None) for e in both]
+            by = (
+                ""
+                if None in homes
+                else ", by " + " and by ".join(h or "the project itself" for h in homes)
+            )
+            raise DeclarationError(f"{kind} '{entry.name}' is declared twice{by}: rename one")
         index[entry.name] = entry
     return index
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import shutil
 import sys
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
 from dataclasses import replace
@@ -31,7 +31,7 @@ from benchmarks.runner.ground_truth import simulate_quasi_static
 from benchmarks.runner.measurements import measure_cell, roll_outs_of
 from benchmarks.runner.rows import rows_of
 from benchmarks.runner.run_json import RunLog, now
-from benchmarks.runner.task import Context, Outcome
+from benchmarks.runner.task import Context, Outcome, failure
 from benchmarks.scene import Scene
 from reference_sim import Potential, Trajectory
 from reference_sim.minimise.lbfgs import LBFGS
@@ -116,8 +116,11 @@ def _run_scene(
             outcomes[cell.id()] = run_cell(cell, 0.0, context, {})
     simulated = any(cell.entry.role == "reference" and runs(cell) for cell in cells)
     if scene.dynamic and simulated:
-        id = id_of("quasi-static", scene)
-        outcomes[id] = Outcome() if reference else simulate_quasi_static(scene, context, {})
+        solved = Outcome() if reference else _attempt(simulate_quasi_static, scene, context, {})
+        if solved.usable:
+            outcomes[id_of("quasi-static", scene)] = solved
+        else:
+            print(f"{scene.name}: quasi-static solutions: {solved.ending}", file=sys.stderr)
     context.memo["roll-outs"] = roll_outs_of(cells, plan.study.sizes.gap_samples, context, outcomes)
     for cell in cells:
         if reference and cell.method in metrics:
@@ -126,10 +129,26 @@ def _run_scene(
             measured[cell.id("metrics")] = Outcome(result=metrics[cell.method])
         elif outcomes[cell.id()].files:
             with _steps_beside(context.memo["roll-outs"][cell]):
-                measured[cell.id("metrics")] = measure_cell(
-                    cell, cells, plan.study.sizes.gap_samples, plan.metrics, context, outcomes
+                measured[cell.id("metrics")] = _attempt(
+                    measure_cell,
+                    cell,
+                    cells,
+                    plan.study.sizes.gap_samples,
+                    plan.metrics,
+                    context,
+                    outcomes,
                 )
     return outcomes | measured
+
+
+def _attempt(task: Callable[..., Outcome], *arguments: Any) -> Outcome:
+    """Return the outcome of a task, a failed one where it raises: all else is kept."""
+    try:
+        return task(*arguments)
+    except OSError:  # as of a full disk, which the command says itself
+        raise
+    except Exception as error:
+        return failure(error)
 
 
 def _save(reference: Reference, cell: Cell, context: Context) -> Outcome:

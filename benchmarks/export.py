@@ -32,7 +32,7 @@ exit status: 0 written; 2 the scene is not known or cannot be made, or the folde
   why and nothing is written; 130 interrupted."""
 
 
-@command(PROGRAM)
+@command(PROGRAM, goes_on="the same command goes on")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
     one_thread()
@@ -55,6 +55,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if motion == "training-motions":
         from benchmarks.runner.training_motions import plan_training_motions, write_training_motions
 
+        if folder.is_dir():
+            raise StudyError(f"{folder}: is a folder; name a file, as motions.h5")
         written = write_training_motions(garment, plan_training_motions(garment, options), folder)
         print(f"{len(written)} training motions of {garment} in {folder}")
         return 0

@@ -1,8 +1,9 @@
 """Shipped references: a scene of the T-shirt's test motions is scored without being simulated.
 
 A file has the simulation to four micrometres, its quasi-static solution at the hem, and the metrics of
-simulation, skinning, SNUG and PBNS. It serves a scene whose declaration, sizes and protocol are those that
-it was made with. `benchmarks.publish references` makes them.
+simulation, skinning, SNUG and PBNS, but for the excess of PBNS in its own energies: these have no inertia.
+It serves a scene whose declaration, sizes and protocol are those that it was made with.
+`benchmarks.publish references` makes them.
 """
 
 from __future__ import annotations

@@ -50,7 +50,7 @@ exit status: 0 scored; 1 something failed, a line says what; 2 the roll-out cann
   to the scene: one line says why and nothing is written; 130 interrupted."""
 
 
-@command(PROGRAM)
+@command(PROGRAM, goes_on="the same command begins again")
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
     typed = list(sys.argv[1:] if arguments is None else arguments)

@@ -74,7 +74,7 @@ def time_run(
     gc.collect()  # what preparing has left is not charged to the run
     before = set(threading.enumerate())
     children = set(multiprocessing.active_children())
-    used, runs, last, first = 0.0, [], None, True
+    used, runs, last = 0.0, [], None
     while True:
         with _compilations() as compiled:
             _synchronise()
@@ -83,10 +83,9 @@ def time_run(
             np.add.reduce(np.asarray(read(result)), axis=None)  # computes what waits to be looked at
             _synchronise()
             seconds, busy = time.perf_counter() - clock, time.process_time() - busy
-        if first and compiled:
-            first, last = False, result
+        if compiled and last is None:  # in the first run, which is not counted
+            last = result
             continue
-        first = False
         runs.append(seconds)
         used += busy
         if last is not None and np.may_share_memory(np.asarray(read(last)), np.asarray(read(result))):

@@ -46,10 +46,8 @@ def perturb_start(scene: BuiltScene, shift: float) -> BuiltScene:
 def make_own_reference(*, models: Path, seed: int, **options: Any) -> Simulation:
     """Make the simulation of the energies of a recipe with these options, the default's in all else."""
     recipe = replace(DEFAULT, **options)
-    change = partial(swap_energies, recipe=recipe)
-    if "inertia" in recipe.terms:
-        return Simulation(change=change)
-    return Simulation(STATIC, change=change)
+    steps = {} if "inertia" in recipe.terms else STATIC
+    return Simulation(steps, partial(swap_energies, recipe=recipe))
 
 
 def make_perturbed_start(*, models: Path, seed: int, shift: float, **options: Any) -> Simulation:

@@ -35,8 +35,12 @@ SHIFTING = 5e-3  # [m] rms static displacement below which there is nothing to b
 MAX_LAG = 12.0  # frames
 SHORTEST = 8  # frames of which a motion can be said
 NO_MOTION = 1e-6  # [m] rms of a dynamic part that is none
-TITLES = ("Hem correlation", "Hem amplitude", "Gain", "Lag")
-HEM = tuple(zip(("correlation", "amplitude", "gain", "lag"), TITLES))
+HEM = (
+    ("correlation", "Hem correlation"),
+    ("amplitude", "Hem amplitude"),
+    ("gain", "Gain"),
+    ("lag", "Lag"),
+)
 
 
 def dynamic_part(moving: Array, static: Array) -> Array:

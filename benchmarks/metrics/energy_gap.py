@@ -30,6 +30,7 @@ import numpy as np
 from benchmarks.metric import Estimate, Measurements, metrics_of
 from benchmarks.metrics.curvature import boundary_mask, mean_curvature
 from benchmarks.metrics.energy import copy_terms, freeze_step
+from benchmarks.metrics.penetration_and_distances import MM
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -42,7 +43,6 @@ if TYPE_CHECKING:
 ITERATIONS = 300
 PRECISION = 0.1  # standard error of the gap, as a share of it
 NEGLIGIBLE = 1e-6  # of the scale: a standard error below it is small enough however small the gap is
-MM = 1e3
 MEANS = ("gap/energy", "gap/local", "gap/refrozen", "step/distance", "step/curvature", "gradient/norm")
 
 

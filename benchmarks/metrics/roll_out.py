@@ -22,7 +22,6 @@ if TYPE_CHECKING:
     from reference_sim.cloth import Cloth
 
 AFTER = (1, 10, 30)  # frames after the glitch
-MM = 1e3
 OF_CLOTH = ("strain", "bending", "inertia")
 LOST = 0.5  # [m] from the skinned shirt: a vertex so far off is on no body any more
 
@@ -36,7 +35,7 @@ def measure_extrapolation(roll_out: RollOut) -> dict[str, float]:
     worst = float(strains(scene.cloth, whole).max())
     values = {
         "motion/strain": worst,
-        "motion/offset": MM * float(np.linalg.norm(whole - bare[: len(whole)], axis=2).max()),
+        "motion/offset": geometry.MM * float(np.linalg.norm(whole - bare[: len(whole)], axis=2).max()),
     }
     garment, ordinary = scene.dressed.garment, roll_out.counterpart
     if ordinary is not None:
@@ -48,7 +47,7 @@ def measure_extrapolation(roll_out: RollOut) -> dict[str, float]:
     if scene.glitch is not None and ordinary is not None:
         gaps = geometry.distance_rms(whole, ordinary[: len(whole)])
         values |= {
-            f"motion/recovery_{after}": MM * float(gaps[scene.glitch + after])
+            f"motion/recovery_{after}": geometry.MM * float(gaps[scene.glitch + after])
             for after in AFTER
             if scene.glitch + after < len(gaps)
         }
@@ -57,7 +56,7 @@ def measure_extrapolation(roll_out: RollOut) -> dict[str, float]:
 
 def judge(roll_out: RollOut, values: dict[str, float]) -> tuple[str, str] | None:
     """Return that a network diverged whose garment left the body, or None."""
-    offset = values.get("motion/offset", 0.0) / MM
+    offset = values.get("motion/offset", 0.0) / geometry.MM
     if roll_out.entry.trained and offset > LOST:
         return "diverged", f"a vertex came {offset:.2g} m away from the skinned shirt"
     return None
@@ -87,7 +86,7 @@ def measure_long_roll_out(roll_out: RollOut) -> dict[str, float]:
     return {
         "roll_out/first": float(cloth[early][FIRST_FULL_FRAME:].mean()),
         "roll_out/last": float(cloth[late][FIRST_FULL_FRAME:].mean()),
-        "roll_out/drift": MM * float(np.sqrt((moved[FIRST_FULL_FRAME:] ** 2).sum(-1).mean())),
+        "roll_out/drift": geometry.MM * float(np.sqrt((moved[FIRST_FULL_FRAME:] ** 2).sum(-1).mean())),
     }
 
 

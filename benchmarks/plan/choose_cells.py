@@ -198,7 +198,8 @@ def _check_user_scenes(scenes: Sequence[Scene], motions: Motions) -> None:
     settling = [scene.name for scene in starts if scene.simulated and not scene.start_of]
     for scene in (scene for scene in scenes if scene.declared_in):
         for field, names in (("start_of", settling), ("motion", [*motions.files, *LIBRARY])):
-            if (word := getattr(scene, field)) not in ("", *names):
+            needed = scene.dressed and field == "motion"
+            if (word := getattr(scene, field)) not in (*[""] * (not needed), *names):
                 place = f"{scene.declared_in}: scene '{scene.name}': {field}='{word}'"
                 raise StudyError(f"{place}: nothing that serves is called so; {nearest(word, names)}")
 

@@ -13,6 +13,7 @@ from re import split
 from textwrap import fill, indent, shorten
 from typing import Any
 
+from benchmarks.assets import LIBRARY
 from benchmarks.declarations import attributes_of
 from benchmarks.external.roll_out_files import parse_roll_out
 from benchmarks.plan.choose_cells import matching, scenes_of_parts
@@ -116,8 +117,13 @@ def _tables(options: argparse.Namespace) -> Iterator[Table]:
         elif field == "motions":
             paths = list(map(split_words, value))
             value = [path for path, _ in paths]
-            if fields := {name: word for _, table in paths for name, word in table.items()}:
-                yield option("motion_files", fields)
+            words = [table for path, table in paths if path != LIBRARY] or [{}]
+            if any(table != words[0] for table in words):
+                raise StudyError(
+                    "motions: words behind a path hold for all files: give each path the same"
+                )
+            if words[0]:
+                yield option("motion_files", words[0])
         elif field == "rollouts":
             value = dict(map(parse_roll_out, value))
         elif field not in SINGLE:

@@ -24,6 +24,10 @@ from snug.trained import FOLDER
 PARTS = ("garments", "speed", "validation", "extremes", "shapes")  # that reports know
 
 
+# Fields of sizes that are numbers of things.
+COUNTS = ("garment_vertices", "train_motions", "test_motions", "clip_frames", "sheet_cells", "repeats")
+
+
 class StudyError(ValueError):
     """A field of a study that cannot be meant; the message names its place and what there is instead."""
 
@@ -135,6 +139,11 @@ class Study:
             raise StudyError(f"seeds: '{seeds}': give {remedy}")
         if self.sizes.frames < FEWEST_FRAMES:
             raise StudyError(f"sizes.frames: {self.sizes.frames}: give {FEWEST_FRAMES} or more")
+        counts = {name: getattr(self.sizes, name) for name in COUNTS}
+        counts |= {f"steps.{name}": steps for name, steps in self.sizes.steps.items()}
+        for name, count in counts.items():
+            if count is not None and count < 1:
+                raise StudyError(f"sizes.{name}: {count}: give 1 or more")
         for name in self.parts:
             if name not in PARTS and not self.parts[name].question:
                 remedy = f"choose from {', '.join(PARTS)}, or give it a question"

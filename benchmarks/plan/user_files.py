@@ -151,7 +151,7 @@ def import_file(home: str) -> ModuleType:
     """Load the module of a file. Raises DeclarationError, with the line of the file at fault."""
     try:
         module = load(home)
-    except DeclarationError:
+    except (DeclarationError, KeyboardInterrupt):
         raise
     except BaseException as error:  # whatever a user's file raises, also what usually ends a program
         fault = error.msg if isinstance(error, SyntaxError) else f"{type(error).__name__}: {error}"

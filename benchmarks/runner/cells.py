@@ -114,11 +114,13 @@ def compute_cell(cell: Cell, min_time: float, context: Context) -> Outcome:
     paths = [folder.trajectory_path(*cell.key)]
     provenance = {"run_seconds": reading.seconds, "scene": scene.name, "seed": cell.seed}
     replace(trajectory, provenance=trajectory.provenance | provenance).save(paths[0])
+    import numpy as np
+
     quasi_static = method.quasi_static() if cell.scene.dynamic or not cell.scene.dressed else None
     if quasi_static is not None:
         if fault := misshapen(quasi_static.positions, scene):
             raise ValueError(f"quasi_static() {fault}")
-        same = (quasi_static.positions == trajectory.positions).all()  # one file serves for both
+        same = np.array_equal(quasi_static.positions, trajectory.positions)  # one file serves for both
         paths.append(paths[0] if same else folder.quasi_static_path(*cell.key))
         if not same:
             quasi_static.save(paths[1])

@@ -37,9 +37,9 @@ class LocalProcesses:
 
     def do(self, tasks: Sequence[Task], needed: Needed) -> Iterator[Outcome]:
         """Yield the outcomes of a batch, done by one process; called by several threads."""
-        if self._idle:
+        try:
             process = self._idle.pop()
-        else:
+        except IndexError:  # none is idle, or another thread was first
             process = TaskProcess(*self._known)
             self._all.append(process)
         for task in tasks:

@@ -64,10 +64,12 @@ def rows_of_cell(
                 metrics["cost/frame"] = declared_ms
             if cell.scene.timed:
                 metrics |= model_costs(network, taught_by)
+            if status == "ok" and not metrics:
+                status, reason = "skipped", "no metric that the scene names applies to it"
             reason = with_remarks(reason, network)
     batch = outcomes.get(cell.id("batch"), Outcome())
     if batch.result.get("complaint"):  # it worked on behind the clock in its run too
-        status, reason, metrics = "failed", f"many at once: {batch.status}: {batch.reason}", {}
+        status, reason, metrics = "failed", f"many at once: {batch.ending}", {}
     scene, entry = cell.scene, cell.entry
     # Of a cell without numbers: nobody has asked for a time where none is taken.
     untimed = "energy" in (scene.metrics or ()) and not scene.timed
@@ -124,14 +126,14 @@ def clock_costs(cell: Cell, repeats: int, outcomes: Outcomes) -> tuple[dict[str,
     remark = ""
     batch = outcomes.get(cell.id("batch"), Outcome("skipped"))
     if batch.status not in ("ok", "skipped"):
-        remark = f"many at once: {batch.status}: {batch.reason}"
+        remark = f"many at once: {batch.ending}"
     results = [first.result]
     for number in range(1, repeats):
         repeat = outcomes.get(cell.id("repeat", number), Outcome("skipped"))
         if repeat.status == "ok":
             results.append(repeat.result)
         elif repeat.status != "skipped":
-            remark = remark or f"repeat {number}: {repeat.status}: {repeat.reason}"
+            remark = remark or f"repeat {number}: {repeat.ending}"
     seconds = [result["seconds"] for result in results]
     costs = {"cost/frame": MS * median(seconds) / first.result["frames"]}
     if "inputs" in first.result:

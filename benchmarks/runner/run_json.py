@@ -95,7 +95,7 @@ class RunLog:
         for task in runner.tasks:
             outcome = runner.outcomes[task.id]
             if task.silent:
-                failed = {"failed": f"{outcome.status}: {outcome.reason}"} if outcome.failed else {}
+                failed = {"failed": outcome.ending} if outcome.failed else {}
                 facts = {**outcome.result, **failed, "wall_seconds": round(outcome.seconds, 3)}
                 of_kind.setdefault(task.stage, {})[task.label] = facts
         self.config["tasks"], self.config["finished"] = of_kind, now()

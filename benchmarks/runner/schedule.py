@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from benchmarks import provenance
 from benchmarks.method import MethodEntry, Simulated
 from benchmarks.methods import find_method
+from benchmarks.methods.own_energies import find_own_reference
 from benchmarks.metric import COMPARED_WITH
 from benchmarks.plan.cell import Cell, TaskId, flat, id_of
 from benchmarks.plan.plan import Network, Plan, network_of, runs
@@ -279,7 +280,8 @@ class Schedule:
         """Return the task that measures a cell, beside those that it is compared with."""
         scene, plan, entry = cell.scene, self.plan, cell.entry
         cells = tuple(other for other in plan.cells if other.scene == scene and runs(other))
-        compared = (other for other in cells if other.entry.role in COMPARED_WITH)
+        own = find_own_reference(entry)  # whose energies it is measured by, too
+        compared = (o for o in cells if o.entry.role in COMPARED_WITH or (own and o.method == own.name))
         reads = tuple(other.id() for other in compared if other != cell)
         if scene.simulated:
             reads = (*reads, id_of("start", scene))  # the scene is built from it

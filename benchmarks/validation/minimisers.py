@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 
 import reference_sim as sim
@@ -39,14 +41,8 @@ def newton_order() -> float:
     """Return the order of the last steps of Newton's method: slope of log error over log error before."""
     potential, start = _pull_sheet()
     end = minimum(potential.energies, start, tolerance=1e-13)
-    errors = [
-        float(
-            np.abs(
-                sim.minimise(potential, start, max_iterations=k, tolerance=1e-13).positions - end
-            ).max()
-        )
-        for k in range(1, 12)
-    ]
+    run = partial(sim.minimise, potential, start, tolerance=1e-13)
+    errors = [float(np.abs(run(max_iterations=k).positions - end).max()) for k in range(1, 12)]
     steps = [k for k in range(len(errors) - 1) if errors[k] < 1e-3 and errors[k + 1] > 1e-15]
     return fit_order([errors[k + 1] for k in steps], [errors[k] for k in steps])
 

@@ -112,19 +112,17 @@ C11 = {  # over k: of the families on which it is rational or sqrt(3)/2
 Terms = Callable[[sim.Cloth], Sequence[energies.Energy]]
 
 
-def _vary(name: str, families: Sequence[str]) -> dict[str, dict[str, str]]:
-    """Return the variants of a known answer on families of triangles, with hinges unscaled and scaled."""
+def _vary(families: Sequence[str]) -> dict[str, dict[str, str]]:
+    """Return the variants of `plate_stiffness` on families of triangles, with hinges unscaled and scaled."""
     return {
-        f"{name}_{family}_{title}": {"family": family, "scaling": scaling}
+        f"plate_stiffness_{family}_{title}": {"family": family, "scaling": scaling}
         for family in families
         for title, scaling in SCALINGS.items()
     }
 
 
-@known_answer(_vary("plate_stiffness", ["delaunay"]), smoke=False, reason="reported: a mean of one patch")
-@known_answer(
-    _vary("plate_stiffness", [*C11]), smoke=False, tolerance=3e-4, reason="the corners leave (1/24)^2"
-)
+@known_answer(_vary(["delaunay"]), smoke=False, reason="reported: a mean of one patch")
+@known_answer(_vary([*C11]), smoke=False, tolerance=3e-4, reason="the corners leave (1/24)^2")
 def plate_stiffness(family: str, scaling: str) -> tuple[float, float | None]:
     """Return the C11/k of hinges, twice the energy per area of a patch bent to a cylinder."""
     exact = C11.get(family, (None, None))[scaling != "none"]
