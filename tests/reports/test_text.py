@@ -83,7 +83,7 @@ def test_a_part_without_an_end_and_a_part_of_no_form_are_refused(tmp_path):
         "table overview of quick, paper_text; method; snug, nobody",
         "table energies of quick; method; snugg", "table paper_table_1 of quick",
     ):  # fmt: skip
-        with pytest.raises(KeyError):
+        with pytest.raises(KeyError, match=request.split()[-1]):
             published_part(request)
 
 
