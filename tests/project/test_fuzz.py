@@ -33,7 +33,7 @@ from snug.motion.motion import MotionError
 from snug.networks.garment_network import make_network
 from snug.networks.trained_model import TrainedModel
 from snug.recipe import DEFAULT
-from tests.snug.body.test_smpl_files import smpl_arrays
+from tests.snug.body.test_smpl_files import saved, smpl_arrays
 from tests.snug.motion.motion_forms import amc_frame, bvh, cmu_like
 from tests.snug.training.dressing import tailored
 
@@ -84,11 +84,7 @@ CLIP = ":FULLY-SPECIFIED\n:DEGREES\n" + amc_frame(1) + amc_frame(2)
 
 
 def write_body(path: Path) -> None:
-    arrays = smpl_arrays(Body.load())
-    if path.suffix == ".pkl":
-        path.write_bytes(pickle.dumps(arrays))
-    else:
-        np.savez_compressed(path, **arrays)
+    saved(path, smpl_arrays(Body.load()))
 
 
 def write_model(path: Path) -> None:

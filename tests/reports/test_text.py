@@ -73,7 +73,7 @@ def test_a_number_that_was_changed_by_hand_is_found_and_mended(tmp_path, monkeyp
     assert main(["--check"]) == 0 and capsys.readouterr().err == ""
 
 
-def test_a_part_without_an_end_and_a_part_of_no_form_are_refused(tmp_path):
+def test_a_part_without_an_end_and_a_part_of_no_form_are_refused():
     with pytest.raises(ValueError, match="needs an"):
         fill(BEGIN.format("front of quick"), lambda request: "")
     with pytest.raises(ValueError, match="known: docstring"):

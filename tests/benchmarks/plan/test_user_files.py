@@ -19,6 +19,7 @@ from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule
+from benchmarks.scenes import find_scene
 from reference_sim.files.array_file import read_arrays
 from snug.recipe import DEFAULT, RecipeError
 from tests.benchmarks.plan.outside_files import (
@@ -26,7 +27,6 @@ from tests.benchmarks.plan.outside_files import (
     METRIC_FILE,
     PROGRAM,
     PROGRAM_FILE,
-    SCENE,
     SCENE_FILE,
     TINY,
     as_before,
@@ -214,7 +214,7 @@ def test_a_program_that_goes_wrong_says_so_in_its_last_line(body, seconds, messa
     script.write_text(f"import sys\n_, scene, out = sys.argv\n{body}\n")
     entry = program("p", f"{sys.executable} -I {script} {{scene}} {{out}}", seconds=seconds)
     method = entry.make(models=tmp_path, seed=0)
-    method.prepare(SCENE["free_fall"].at(TINY).build())
+    method.prepare(find_scene("free_fall").at(TINY).build())
     with pytest.raises(Exception) as raised:
         method.run()
     assert message in str(raised.value) and "\n" not in str(raised.value)

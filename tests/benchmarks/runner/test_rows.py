@@ -133,7 +133,7 @@ def test_a_run_that_has_just_begun_leaves_what_the_rows_there_mean(tmp_path):
     assert before["digests"] and all(after[name] == before[name] for name in ("scenes", "digests"))
 
 
-def test_new_numbers_of_test_motions_are_a_look_and_others_are_none(tmp_path, capsys):
+def test_new_numbers_of_test_motions_are_a_look_and_others_are_none(tmp_path):
     motions = Motions(("walk",), ("dance_turn",), validation=("kick",))
     cells = [
         Cell(dressed_scene(name), find_method("skinning"), 0, ("garments",))
