@@ -60,17 +60,19 @@ def test_most_memory_is_between_what_is_held_and_the_systems_count():
 
 @pytest.mark.parametrize("always", [False, True])
 def test_a_first_run_that_compiles_is_no_measurement(always):
-    kernels, calls = [], []
+    kernels, calls, lasted = [], [], []
 
     def run():
+        begin = time.perf_counter()
         if always or not kernels:
             kernels.append(numba.njit(lambda x: x + 1.0))
         calls.append(kernels[-1](1.0))
+        lasted.append(time.perf_counter() - begin)
         return np.zeros((2, 3, 3))
 
     _, reading = time_run(run, read=positions_of)
     assert len(calls) == 2 and len(reading.runs) == 1  # whoever compiles in each run is measured so
-    assert (reading.seconds < 0.005) is not always and reading.complaint == ""  # compiling takes 20 ms
+    assert abs(reading.seconds - lasted[1]) < abs(reading.seconds - lasted[0]) and reading.complaint == ""
 
 
 def test_an_answer_that_was_kept_from_the_first_run_is_found():

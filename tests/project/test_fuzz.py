@@ -150,6 +150,7 @@ def test_mutated_files_are_refused_in_one_line_that_names_them(name, count, tmp_
     (write, read), whole, path, refused = READERS[name], tmp_path / name, tmp_path / f"mutated_{name}", 0
     write(whole)
     read(whole)
+    Path("/proc/self/clear_refs").write_text("5")  # the peak begins anew
     before = peak_memory()
     for number in range(count):
         path.write_bytes(mutated(whole.read_bytes(), random.Random(number)))

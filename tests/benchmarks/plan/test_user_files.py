@@ -203,7 +203,7 @@ def test_a_method_brings_the_training_of_its_network(tmp_path):
 @pytest.mark.parametrize(
     ("body", "seconds", "message"),
     [
-        ("import time; print('loading', flush=True); time.sleep(9)", 0.5, "was ended after 0.5 s: loading"),
+        ("import time; print('loading', flush=True); time.sleep(9)", 2, "was ended after 2 s: loading"),
         ("pass", 9, "has not written {out}"),
         ("import numpy as n; x = n.load(scene + '/cloth.npz')['start_positions']\n"
          "n.savez(out, positions=n.stack(6 * [x]), seconds_per_frame=-1.0)", 9, "no positive number"),
