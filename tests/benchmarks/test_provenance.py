@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ast
 import dataclasses
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -125,11 +126,12 @@ def test_digests_tell_values_apart():
     one = Pair(np.arange(3.0), "x")
     assert digest(one) == digest(Pair(np.arange(3.0), "x"))
     others = [
-        Pair(np.arange(3.0) + 1e-16, "y"),
+        Pair(np.arange(3.0) + 1e-16, "x"),
+        Pair(np.arange(3.0), "y"),
         Pair(np.arange(3), "x"),
         Pair(np.arange(3.0)[:, None], "x"),
     ]
-    assert len({digest(value) for value in (one, *others)}) == 4
+    assert len({digest(value) for value in (one, *others)}) == 5
     with pytest.raises(TypeError, match="object"):
         digest({"a": object()})
 
@@ -139,14 +141,17 @@ def test_a_commit_is_that_of_the_code_and_changes_are_those_of_code(tmp_path, mo
     monkeypatch.setattr(provenance, "ROOT", tmp_path)
 
     def git(*words: str) -> str:
-        settings = ("-c", "user.name=a", "-c", "user.email=a@b", "-c", "commit.gpgsign=false")
-        done = subprocess.run(["git", *settings, *words], cwd=tmp_path, capture_output=True, text=True)
+        command = ["git", "-c", "user.name=a", "-c", "user.email=a@b", *words]
+        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
         return done.stdout.strip()
 
     def commit() -> str:
         provenance.commit.cache_clear()
         return provenance.commit()
 
+    for name in [name for name in os.environ if name.startswith("GIT_")]:
+        monkeypatch.delenv(name)
+    monkeypatch.setenv("GIT_CONFIG_GLOBAL", os.devnull)
     git("init", "-q")
     for path in ("snug/network.py", "reports/build.py", "snug/trained/a.safetensors"):
         write(tmp_path, path, "1")

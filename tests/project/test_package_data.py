@@ -31,5 +31,5 @@ def test_every_data_file_is_named_among_the_data_of_its_package():
 
 def test_the_licences_are_there():
     named = SETTINGS["project"]["license-files"]
-    notices = [path.relative_to(ROOT).as_posix() for path in ROOT.rglob("snug/**/NOTICE.md")]
+    notices = [path.relative_to(ROOT).as_posix() for path in (ROOT / "snug").rglob("NOTICE.md")]
     assert {"LICENSE", *notices} == set(named) and all((ROOT / name).is_file() for name in named)

@@ -61,11 +61,11 @@ def is_free(obstacle: Obstacle, faces: np.ndarray, fall: np.ndarray) -> bool:
 
 
 FREE = [seed for seed in range(45) if is_free(*(case(seed)[place] for place in (0, 2, 3)))]
+assert len(FREE) >= 30
 
 
 @pytest.mark.parametrize("seed", FREE)
 def test_what_never_comes_within_the_margin_falls_freely(seed):
-    assert len(FREE) >= 30
     obstacle, rest, faces, fall = case(seed)
     cloth = Cloth(rest, faces)
     terms = [StretchStVK(cloth), Gravity(cloth), ContactPenalty(cloth, margin=MARGIN)]

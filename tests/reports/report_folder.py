@@ -15,6 +15,7 @@ from benchmarks.results.row import Row
 from benchmarks.results.run_folder import FORMAT, RunFolder
 from reference_sim import Trajectory
 from reports.finished_run import Run, make_run
+from tests.reference_sim.meshes import grid
 
 TERMS = {"strain": 0.1, "bending": 0.01, "gravity": 0.3, "inertia": 0.004, "collision": 0.02}
 SHOWN = {"simulation": 1.0, "skinning": 9.0, "snug": 2.0, "pbns": 3.0}
@@ -90,12 +91,8 @@ def write_roll_outs(run: RunFolder, scenes: Iterable[str], methods: Iterable[str
 
 def sheet(height: float) -> tuple[np.ndarray, np.ndarray]:
     """A 4 x 4 sheet in the xy plane at z = height, (T,V,3) and (F,3)."""
-    x, y = np.meshgrid(np.linspace(0, 0.4, 4), np.linspace(1.0, 1.5, 4))
-    points = np.stack([x.ravel(), y.ravel(), np.full(16, height)], axis=1)
-    corner = (np.arange(3)[:, None] * 4 + np.arange(3)).ravel()
-    faces = np.concatenate(
-        [np.stack([corner, corner + 1, corner + 5], 1), np.stack([corner, corner + 5, corner + 4], 1)]
-    )
+    x, faces = grid(3, 3, width=0.5, depth=0.4)
+    points = x[:, [2, 0, 1]] + [0.0, 1.0, height]
     return np.repeat(points[None], FRAMES, axis=0), faces
 
 

@@ -79,12 +79,12 @@ def test_a_table_has_one_protocol_and_one_set_of_scenes_and_is_sorted(tmp_path, 
     assert f"better {NASTY}; they" in json.dumps(content, ensure_ascii=False)
 
 
-def test_a_roll_out_that_fell_off_is_seen_in_an_entry_of_few_motions(tmp_path, published):
+def test_a_roll_out_that_fell_off_is_seen_in_an_entry_of_few_motions(tmp_path):
     entry = load_entry(write_entry(tmp_path, "mine", {"tshirt/a": 1.8, "tshirt/b": -20.0}))
     assert entry.cells()[2].shown == pytest.approx(10.0) and not entry.cells()[2].complete
 
 
-def test_scores_of_files_as_they_were_scored_are_marked_by_who_made_them(tmp_path, published):
+def test_scores_of_files_as_they_were_scored_are_marked_by_who_made_them(tmp_path):
     folder, scores = write_entry(tmp_path, "mine", 2.0), RunFolder(tmp_path / "mine" / "scores")
     (folder / "x.npz").write_text("frames")
     config = scores.read_config() | {

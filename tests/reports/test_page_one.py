@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 
 from reports.sentences import FELL, TRAINED, headline
-from reports.statistics.outcomes import leads
+from reports.statistics.outcomes import leads, published_verdicts
 from tests.reports.report_folder import SCENES, all_rows, row, run_of
 from tests.reports.tables.test_tables import on_two_scenes
 
@@ -14,11 +14,11 @@ MEMBER = "simulation-perturbed-1e-4"  # of the reference's family
 BESIDE = [*on_two_scenes("simulation", 0.5, 7.0), *on_two_scenes("skinning", 10.5, 17.0)]
 SNUG = on_two_scenes("snug", 1.0, 9.0)  # 5 and 20 % of skinning's excess
 PBNS = on_two_scenes("pbns", 1.5, 10.0)
-SENTENCES = """\
+SENTENCES = f"""\
 Verdict: In a typical unseen motion SNUG has 10 % of skinning's excess energy over a converged
 simulation (12 % summed over all motions).
-How certain: Of 1 test of primary claims of the paper 1 is inconclusive with one seed; in the published run 6
-hold, 2 do not hold, 1 is inconclusive."""
+How certain: Of 1 test of primary claims of the paper 1 is inconclusive with one seed; in the published run
+{published_verdicts()}."""
 
 
 def said(topic: str, rows, **config) -> str:

@@ -73,7 +73,7 @@ def test_a_number_that_was_changed_by_hand_is_found_and_mended(tmp_path, monkeyp
     assert main(["--check"]) == 0 and capsys.readouterr().err == ""
 
 
-def test_a_part_without_an_end_and_a_part_of_no_form_are_refused(tmp_path):
+def test_a_part_without_an_end_and_a_part_of_no_form_are_refused():
     with pytest.raises(ValueError, match="needs an"):
         fill(BEGIN.format("front of quick"), lambda request: "")
     with pytest.raises(ValueError, match="known: docstring"):
@@ -83,7 +83,7 @@ def test_a_part_without_an_end_and_a_part_of_no_form_are_refused(tmp_path):
         "table overview of quick, paper_text; method; snug, nobody",
         "table energies of quick; method; snugg", "table paper_table_1 of quick",
     ):  # fmt: skip
-        with pytest.raises(KeyError):
+        with pytest.raises(KeyError, match=request.split()[-1]):
             published_part(request)
 
 
@@ -150,5 +150,6 @@ def test_times_stand_as_published_and_as_measured():
     assert "HyperBones" in names[5:]
     by_name = {row[0]: row for row in rows}
     assert by_name["SNUG"][1] == "2.2" and "table 3" in by_name["SNUG"][3]
-    assert by_name["SNUG"][4:6] == ["0.426", "0.148"] and by_name["HyperBones"][4:] == ["–"] * 3
+    assert all(float(cell) > 0 for cell in by_name["SNUG"][4:6])
+    assert by_name["HyperBones"][4:] == ["–"] * 3
     assert all(row[3] != "–" for row in rows[1:] if row[1] != "–")  # no time without its source

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from benchmarks.method import Method
+from benchmarks.methods import sweeps
 from benchmarks.methods.simulation import Simulation
 from benchmarks.methods.warm_started import WarmStarted
 from reference_sim import cholesky, potential
@@ -23,7 +24,7 @@ SOLVERS = (
 )  # fmt: skip
 SET_UP = (  # what analyses a pattern
     (potential, "nested_dissection"), (cholesky, "nested_dissection"), (factorised, "analyse"),
-    (lbfgs, "analyse"),
+    (lbfgs, "analyse"), (sweeps, "incidence"),
 )  # fmt: skip
 
 

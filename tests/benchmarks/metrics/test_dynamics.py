@@ -107,10 +107,9 @@ def measured(positions, static=None):
     return motion.measure(positions, static)
 
 
-@pytest.mark.parametrize("share", [1.0, 0.5])
-def test_a_share_of_the_dynamics_is_that_share_of_the_amplitude(share):
-    metrics = measured(a_scene(dynamic=share)[2])
-    assert metrics["dynamics/amplitude"] == pytest.approx(share, abs=0.02)
+def test_a_share_of_the_dynamics_is_that_share_of_the_amplitude():
+    metrics = measured(a_scene(dynamic=0.5)[2])
+    assert metrics["dynamics/amplitude"] == pytest.approx(0.5, abs=0.02)
     assert metrics["dynamics/correlation"] > 0.99
 
 

@@ -8,11 +8,9 @@ from pathlib import Path
 
 from benchmarks import metrics, run
 from benchmarks.presets import find_preset
-from benchmarks.scenes import SCENES
 from tests.benchmarks.test_provenance import forget
 
 TINY = dataclasses.replace(find_preset("smoke"), sheet_cells=3, sheet_frames=6)
-SCENE = {scene.name: scene for scene in SCENES}
 
 METHOD = """import numpy as np
 from benchmarks import Method, MethodEntry

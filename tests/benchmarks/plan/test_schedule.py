@@ -40,7 +40,7 @@ def test_only_what_trains_depends_on_the_accelerator_and_nothing_on_the_cores(pl
     on_gpu = dataclasses.replace(plan.study, device="cuda")
     assert changed(plan, dataclasses.replace(plan, study=on_gpu)) == {"network"}
     before = inputs_of(plan)
-    monkeypatch.setattr(provenance, "usable_cores", lambda: 7)
+    hardware["cpu"]["cores"] = 7
     assert inputs_of(plan) == before
 
 

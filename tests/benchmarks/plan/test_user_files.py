@@ -19,6 +19,7 @@ from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule
+from benchmarks.scenes import find_scene
 from reference_sim.files.array_file import read_arrays
 from snug.recipe import DEFAULT, RecipeError
 from tests.benchmarks.plan.outside_files import (
@@ -26,7 +27,6 @@ from tests.benchmarks.plan.outside_files import (
     METRIC_FILE,
     PROGRAM,
     PROGRAM_FILE,
-    SCENE,
     SCENE_FILE,
     TINY,
     as_before,
@@ -203,7 +203,7 @@ def test_a_method_brings_the_training_of_its_network(tmp_path):
 @pytest.mark.parametrize(
     ("body", "seconds", "message"),
     [
-        ("import time; print('loading', flush=True); time.sleep(9)", 0.5, "was ended after 0.5 s: loading"),
+        ("import time; print('loading', flush=True); time.sleep(9)", 2, "was ended after 2 s: loading"),
         ("pass", 9, "has not written {out}"),
         ("import numpy as n; x = n.load(scene + '/cloth.npz')['start_positions']\n"
          "n.savez(out, positions=n.stack(6 * [x]), seconds_per_frame=-1.0)", 9, "no positive number"),
@@ -214,7 +214,7 @@ def test_a_program_that_goes_wrong_says_so_in_its_last_line(body, seconds, messa
     script.write_text(f"import sys\n_, scene, out = sys.argv\n{body}\n")
     entry = program("p", f"{sys.executable} -I {script} {{scene}} {{out}}", seconds=seconds)
     method = entry.make(models=tmp_path, seed=0)
-    method.prepare(SCENE["free_fall"].at(TINY).build())
+    method.prepare(find_scene("free_fall").at(TINY).build())
     with pytest.raises(Exception) as raised:
         method.run()
     assert message in str(raised.value) and "\n" not in str(raised.value)

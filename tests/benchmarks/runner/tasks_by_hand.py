@@ -26,7 +26,7 @@ from benchmarks.runner.networks import NetworkTraining
 from benchmarks.runner.schedule import tasks_of
 from benchmarks.runner.task import Context, Outcome, failure
 from benchmarks.scene import BuiltScene
-from benchmarks.scenes import SCENES, find_garment
+from benchmarks.scenes import find_garment, find_scene
 from reference_sim import Trajectory, simulate
 
 TINY = dataclasses.replace(
@@ -36,9 +36,8 @@ TINY = dataclasses.replace(
 
 def small_scene(name: str, *, cells: int = 6, frames: int = 10) -> BuiltScene:
     """A scene of a small sheet."""
-    scene = next(scene for scene in SCENES if scene.name == name)
     sizes = {"sheet_cells": cells, "sheet_frames": frames}
-    return dataclasses.replace(scene, sizes=(), options=sizes).build()
+    return dataclasses.replace(find_scene(name), sizes=(), options=sizes).build()
 
 
 def thirds(positions: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -81,7 +80,7 @@ def plan_of(folder: Path, *names: str, scene: str = "free_fall", how: str = "", 
         "module": "tests.benchmarks.runner.misbehaving", "options": {"how": how}, "batched": True,
         "gives_first_frame": True,
     }  # fmt: skip
-    declared = next(declared for declared in SCENES if declared.name == scene).at(study.sizes)
+    declared = find_scene(scene).at(study.sizes)
     entries = [
         dataclasses.replace(find_method(name), **wrong if how and name != "simulation" else {})
         for name in names

@@ -44,7 +44,7 @@ CONVERGED = {"converged": np.array([1, 1, 0, 0.0])}
     ("changes", "expected"),
     [
         ({}, ("ok", "")),
-        ({"status": "max_iterations", "truncated": True}, ("ok", "")),
+        ({"status": "max_iterations", "truncated": True, "reason": "gave up"}, ("ok", "")),
         ({"status": "max_iterations", "reason": "frame 2: gave up"}, ("stalled", "frame 2: gave up")),
         ({"frames": 2}, ("diverged", "ended after 2 of 4 frames")),
         ({"positions": np.full((4, 3, 3), np.nan)}, ("diverged", "a position is not finite")),
@@ -62,7 +62,7 @@ def test_a_trajectory_is_judged_by_what_is_in_it_and_by_the_clock(changes, expec
     reading = Reading((1.0,), changes.pop("complaint"))
     truncated = changes.pop("truncated")
     status, reason = judge(trajectory(**changes), reading, FOUR, truncated=truncated)
-    assert status == expected[0] and reason.startswith(expected[1])
+    assert status == expected[0] and reason.startswith(expected[1]) and bool(reason) == bool(expected[1])
 
 
 def rows(
@@ -133,7 +133,7 @@ def test_a_run_that_has_just_begun_leaves_what_the_rows_there_mean(tmp_path):
     assert before["digests"] and all(after[name] == before[name] for name in ("scenes", "digests"))
 
 
-def test_new_numbers_of_test_motions_are_a_look_and_others_are_none(tmp_path, capsys):
+def test_new_numbers_of_test_motions_are_a_look_and_others_are_none(tmp_path):
     motions = Motions(("walk",), ("dance_turn",), validation=("kick",))
     cells = [
         Cell(dressed_scene(name), find_method("skinning"), 0, ("garments",))

@@ -78,9 +78,9 @@ def test_an_own_body_wears_the_garment_and_makes_stale_what_was_on_another(tmp_p
     same, other = (read_inputs(body=Path(file)).body.digest for file in (path, again))
     assert same == other  # what was read is known again, not its file
     plans = [planned("full:garments", "--methods", "snug", *more) for more in ((), ("--body", path))]
-    for one, other in zip(*map(tasks_of, plans)):
+    for one, other in zip(*map(tasks_of, plans), strict=True):
         same = dependencies(one, {}) == dependencies(other, {})
-        assert one.kind not in ("network", "cell") or not same, one.id
+        assert one.id == other.id and (one.kind not in ("network", "cell") or not same), one.id
     heights = []
     for plan in plans:
         assets = open_assets(TINY, [make_motion("walk")], ["tshirt"], inputs=plan.inputs)

@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from skfem import Basis, BilinearForm, ElementTriP1, ElementVector, LinearForm, MeshTri
+from skfem import Basis, BilinearForm, ElementTriP1, ElementVector, MeshTri
 
 from reference_sim import Cloth, Material, Potential
-from reference_sim.energies import Gravity, StretchSpring, StretchStVK
+from reference_sim.energies import StretchSpring, StretchStVK
 from tests.reference_sim.meshes import patch, random_rotation
 
 MATERIAL = Material()
@@ -49,21 +49,6 @@ def test_collapsed_to_a_point_the_hessian_is_minus_the_laplacian(basis):
     K = in_mesh_order(laplacian.assemble(basis), basis)
     assert potential.gradient(x) == pytest.approx(0, abs=1e-15)
     assert np.abs(potential.hessian(x).toarray() + (LAM + MU) * K).max() < 1e-12 * (LAM + MU)
-
-
-def test_masses_are_the_integrals_of_the_hat_functions(basis):
-    @LinearForm
-    def hat(v, _):
-        return MATERIAL.areal_density * v[1]
-
-    cloth = turned_cloth()
-    masses = hat.assemble(basis)[basis.nodal_dofs[1]]
-    assert cloth.masses == pytest.approx(masses, rel=1e-12)
-    x = FLAT @ random_rotation(7)
-    height = 1.5
-    assert Potential([Gravity(cloth, origin_height=height)]).value(x) == pytest.approx(
-        9.81 * masses @ (x[:, 1] - height), rel=1e-12
-    )
 
 
 def test_springs_do_not_see_rigid_motion_and_their_forces_turn_with_it():

@@ -28,11 +28,7 @@ def test_a_body_winds_as_its_solid_angles_say():
 @pytest.mark.parametrize("longest", [0, 1, 2])
 def test_rays_through_sides_and_corners_count_once(longest):
     # An octahedron, whose corners and sides lie before one another along every axis.
-    corners = np.concatenate([np.eye(3), -np.eye(3)])
-    faces = np.array([
-        [i, 1 + j, 2 + k] if (i + j + k) % 2 == 0 else [i, 2 + k, 1 + j]
-        for i in (0, 3) for j in (0, 3) for k in (0, 3)
-    ])  # fmt: skip
+    corners, faces = sphere(0)
     grid = np.stack(np.meshgrid(*3 * [np.linspace(-1.0, 1.0, 9)], indexing="ij"), axis=-1).reshape(-1, 3)
     grid = grid[np.abs(grid).sum(axis=1) != 1.0]  # a point on the surface is on neither side
     scale = np.where(np.arange(3) == longest, 1.0, 0.5)

@@ -72,6 +72,8 @@ def test_an_edit_in_another_file_is_seen_and_the_kernel_before_it_stays(name, ol
 
 
 def test_of_two_processes_that_need_a_kernel_one_compiles_it(project):
+    source = (project / "deep.py").read_text()
+    (project / "deep.py").write_text(f"import time\ntime.sleep(1.0)\n{source}")  # both have begun by then
     with ThreadPoolExecutor() as pool:
         assert {one[:2] for one in pool.map(call, [project, project])} == {(655, False), (655, True)}
 

@@ -9,13 +9,7 @@ import numpy as np
 import pytest
 
 from reports.page.embedded_roll_outs import Pack, depth, skin_of
-
-
-def block() -> tuple[np.ndarray, np.ndarray]:
-    """Corners (8,3) and faces (12,3) of the unit cube."""
-    corners = np.array([[x, y, z] for x in (0.0, 1.0) for y in (0.0, 1.0) for z in (0.0, 1.0)])
-    squares = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
-    return corners, np.array([half for a, b, c, d in squares for half in ((a, b, c), (a, c, d))])
+from tests.reference_sim.meshes import box
 
 
 def unpacked(entries: dict, text: str) -> dict[str, np.ndarray]:
@@ -73,8 +67,8 @@ def test_values_are_off_by_less_than_a_hundredth_and_finer_where_small():
 
 
 def test_the_depth_below_the_skin_is_known():
-    corners, box = block()
+    corners, sides = box((0, 0, 0), (1, 1, 1))
     points = np.array([[0.5, 0.5, 0.98], [0.5, 0.5, 1.02], [0.01, 0.3, 0.4]])
-    skin = skin_of(np.stack([corners + 1.0, corners]), box)
+    skin = skin_of(np.stack([corners + 1.0, corners]), sides)
     np.testing.assert_allclose(depth(points, skin, 1), [20.0, 0.0, 10.0], atol=1e-9)
-    assert skin_of(corners, box[1:]) is None
+    assert skin_of(corners, sides[1:]) is None

@@ -23,7 +23,8 @@ from reports.finished_run import read_run
 from reports.page.embedded_roll_outs import groups
 from reports.page.write_page import write_page
 from reports.tables import make_tables
-from tests.reports.page.test_packed_arrays import block, unpacked
+from tests.reference_sim.meshes import box
+from tests.reports.page.test_packed_arrays import unpacked
 from tests.reports.report_folder import row, run_folder, sheet, skipped, write_mesh
 
 NASTY = '</script><script>window.hacked=1</script><img src=x onerror="window.hacked=1">\'" & мантия 裾'
@@ -60,7 +61,7 @@ def moving(height: float, scene: str = WHOLE) -> tuple[np.ndarray, np.ndarray]:
 def make_folder(path: Path) -> RunFolder:
     """A run of three scenes, in whose clips one-step errors are from 0 to 3 mm, unknown in two frames."""
     run = run_folder(path, rows_of_page(), preset="smoke", commit=NASTY)
-    corners, box = block()
+    corners, sides = box((0, 0, 0), (1, 1, 1))
     for scene in (WHOLE, *CLIPS):
         for method, height in METHODS.items():
             cloth, faces = moving(height, scene)
@@ -71,7 +72,7 @@ def make_folder(path: Path) -> RunFolder:
                 steps[:2] = np.nan
                 np.savez(run.curves_path(scene, method), **{"step/vertices": steps})
         body = np.tile(0.5 * corners - [0.0, 0.0, 0.5], (len(cloth), 1, 1))
-        write_mesh(run.trajectory_path(scene, "body"), body, box, {})
+        write_mesh(run.trajectory_path(scene, "body"), body, sides, {})
     return run
 
 

@@ -107,7 +107,7 @@ def test_an_error_cannot_be_told_apart_below_that_of_the_references_other_start(
     assert band(status="stalled", reason="a frame") == pytest.approx(3.0)  # takes no part
 
 
-def test_run_time_is_from_pose_to_vertices_where_every_timed_cell_has_that(tmp_path):
+def test_run_time_is_from_pose_to_vertices_where_every_timed_cell_has_that():
     rows = all_rows()
     frame_times = [r for r in rows if r.metric == "cost/frame"]
     whole = [dataclasses.replace(r, metric="cost/whole", value=r.value + 2.0) for r in frame_times]

@@ -156,7 +156,7 @@ def test_pose_correctives_are_what_smpl_says(small, layouts, tmp_path):
     assert np.abs(posed - small.vertices(poses, np.zeros((2, 3)), betas)).max() > 0.01
 
 
-def test_training_poses_the_body_with_its_correctives(small, tmp_path):
+def test_training_poses_the_body_with_its_correctives(small):
     posedirs = 0.003 * np.random.default_rng(0).normal(size=(len(small.template), 3, 189))
     user = dataclasses.replace(small, pose_directions=posedirs)
     poses = np.random.default_rng(1).normal(scale=0.5, size=(2, 24, 3))

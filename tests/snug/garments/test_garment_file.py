@@ -11,7 +11,6 @@ import pytest
 from benchmarks.assets import make_motions, open_assets, read_inputs
 from benchmarks.presets import find_preset
 from benchmarks.scenes import GarmentScenes
-from reference_sim.energies import BendHinge, StretchStVK
 from reference_sim.material import Material
 from snug import check
 from snug import train as train_command
@@ -36,13 +35,6 @@ def tube():
     return tube_dress().garment
 
 
-def energies(garment):
-    """Return stretching and bending energy [J] of a slightly deformed garment."""
-    cloth = garment.cloth()
-    x = cloth.rest_positions + np.random.default_rng(0).normal(0, 0.003, cloth.rest_positions.shape)
-    return [term(cloth).value_and_gradient(x)[0] for term in (StretchStVK, BendHinge)]
-
-
 def test_the_tshirt_written_and_read_is_the_tshirt(tmp_path, body, shirt):
     read = read_garment(GarmentFile(path=saved(tmp_path, shirt)), body)
     np.testing.assert_array_equal(read.rest_positions, shirt.rest_positions)
@@ -50,18 +42,17 @@ def test_the_tshirt_written_and_read_is_the_tshirt(tmp_path, body, shirt):
     assert read.loops.keys() == shirt.loops.keys() and read.name == "mine" and not len(read.pins)
     for name, loop in shirt.loops.items():
         np.testing.assert_array_equal(read.loops[name], loop)
-    assert energies(read) == energies(shirt)
+    assert read.cloth().material == shirt.cloth().material
     # Its weights are blended over the face below, so near those of the nearest vertex.
     np.testing.assert_allclose(read.skinning_weights.sum(axis=1), 1.0)
     assert np.abs(read.skinning_weights - shirt.skinning_weights).sum(axis=1).mean() < 0.1
 
 
-def test_a_chart_with_seams_is_its_rest_shape_and_gives_the_same_energies(tmp_path, body, shirt):
+def test_a_chart_with_seams_is_its_rest_shape(tmp_path, body, shirt):
     uv = own_chart(shirt.rest_positions, shirt.faces)
     path = saved(tmp_path, shirt, uv=uv)
     read = read_garment(GarmentFile(path=path, rest="uv"), body)
     np.testing.assert_array_equal(read.rest_uv, uv)
-    assert energies(read) == pytest.approx(energies(shirt), rel=1e-12)
     assert read_garment(GarmentFile(path=str(path)), body).rest_uv is None
 
 

@@ -44,9 +44,10 @@ OPENINGS = {
 }  # fmt: skip
 
 
-def test_a_garment_is_a_sphere_with_its_openings_of_even_triangles(garment):
+def test_a_garment_is_a_sphere_with_its_openings_of_even_triangles(garment, request):
     points, faces = garment.rest_positions, garment.faces
-    assert min(abs(len(points) - count) / count for count in (300, 600, 4400)) <= 0.01
+    count = request.node.callspec.params["garment"][1]
+    assert abs(len(points) - count) <= 0.01 * count
     assert np.array_equal(np.unique(faces), np.arange(len(points)))
     halves, edges, counts = edge_counts(faces)
     assert counts.max() == 2 and len(np.unique(halves, axis=0)) == len(halves)  # consistently wound
@@ -59,7 +60,7 @@ def test_a_garment_is_a_sphere_with_its_openings_of_even_triangles(garment):
     for name, loop in garment.loops.items():
         side = {"left": 1, "right": -1}.get(name.partition("_")[0], 0)
         assert np.sign(np.round(points[loop, 0].mean(), 6)) == side, name
-    assert set(garment.pins) == set(garment.loops.get("waist", ()))
+    assert list(garment.pins) == sorted(garment.loops.get("waist", ()))
     assert len(garment.hem) == len(set(garment.hem.tolist())) > 0
     a, b, c = (points[faces[:, k]] for k in range(3))
     areas = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
@@ -206,7 +207,6 @@ def test_a_dress_follows_both_thighs_below_and_the_skin_above(body):
 def test_a_skirt_fits_waist_and_hips_and_has_two_even_rims(body):
     skirt = tailored("skirt", 600)
     points = skirt.rest_positions
-    assert np.array_equal(skirt.pins, np.sort(skirt.loops["waist"]))
     distance = igl.signed_distance(points, body.template, body.faces)[0]
     waist, hem = (points[skirt.loops[name]] for name in ("waist", "hem"))
     hip, knee = (at(body, n)[1] for n in ("left_hip", "left_knee"))

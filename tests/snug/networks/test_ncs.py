@@ -23,6 +23,7 @@ def held(motion: Motion, frame: int, frames: int) -> Motion:
 
 @pytest.fixture
 def network():
+    torch.manual_seed(0)
     network = make_network("ncs", INPUTS, 7, NCS, seed=0)
     torch.nn.init.normal_(network.offsets.weight)
     return network

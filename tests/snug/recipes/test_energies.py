@@ -76,11 +76,6 @@ def test_training_with_it_is_by_all_terms_and_knows_its_recipe(tethered, kernels
     assert type(model).load(model.save(tmp_path / "tethered.safetensors")).recipe == tethered
 
 
-def test_an_energy_of_the_simulator_that_no_recipe_here_has_can_be_trained():
-    rows = short(recipe=replace(PLAIN, terms=(*TERMS, "spring")), steps=2).history
-    assert np.isfinite(rows[-1]["loss"]) and "spring" in rows[-1]
-
-
 @pytest.mark.parametrize(
     ("name", "message"),
     [
