@@ -119,9 +119,14 @@ def test_a_shipped_reference_gives_the_numbers_of_a_fresh_simulation(tmp_path, m
         numbers(RunFolder(tmp_path / "fresh"), "skinning"), rel=1e-3, abs=1e-6
     )
     longer = replace(study, sizes=replace(study.sizes, settle_frames=13))
-    assert score.score(tmp_path / "mine.npz", name, study=longer, folder=tmp_path / "other")["status"] == "ok"
+    assert (
+        score.score(tmp_path / "mine.npz", name, study=longer, folder=tmp_path / "other")["status"]
+        == "ok"
+    )
     said = capsys.readouterr().err  # what needs no simulation is kept
-    assert "none is shipped for this scene" in said and "quasi-static solutions: failed: TypeError" in said
+    assert (
+        "none is shipped for this scene" in said and "quasi-static solutions: failed: TypeError" in said
+    )
 
 
 @pytest.mark.slow  # minutes: a whole scene is simulated
