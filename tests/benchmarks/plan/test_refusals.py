@@ -26,6 +26,9 @@ WORDS = [
     ("dfault", "no study 'dfault': name one, or a file or folder with study.toml; did you mean default"),
     ("full:shapes", "no such scene meets such a method in part shapes"),
     ("--set sizes.frames=2", "sizes.frames: 2: give 3 or more"),
+    ("--set sizes.test_motions=-1", "sizes.test_motions: -1: give 1 or more"),
+    ("--set sizes.steps.snug=0", "sizes.steps.snug: 0: give 1 or more"),
+    ("--motions back.npz,up=z --motions walk.npz", "words behind a path hold for all files"),
     ("--scenes tshirt/walk", "see test_motions"),
     ("--methods sung", "did you mean snug"),
     ("--motions broken.npz", "broken.npz"),
@@ -74,6 +77,7 @@ METHOD_FILES = [
 SCENE_FIELDS = [
     ('metrics=("energies",)', "scene 'lift': metrics=('energies',): choose from "),
     ('start_of="lift"', "scene 'lift': start_of='lift': nothing that serves"),
+    ('garment="tshirt"', "scene 'lift': motion='': nothing that serves is called so"),
     ('garment="tshirt", motion="wlak"', "motion='wlak': nothing that serves is called so; did you mean"),
 ]
 

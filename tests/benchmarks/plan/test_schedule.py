@@ -8,6 +8,7 @@ import pytest
 
 from benchmarks import provenance
 from benchmarks.methods import find_method
+from benchmarks.methods.own_energies import find_own_reference
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.runner.schedule import tasks_of
@@ -48,3 +49,10 @@ def test_what_is_measured_in_a_scene_is_no_part_of_its_cells(plan):
     some = dataclasses.replace(KICK, metrics=("energy", "cost", "dynamics"))
     fewer = tuple(dataclasses.replace(cell, scene=some) for cell in CELLS)
     assert changed(plan, dataclasses.replace(plan, cells=fewer)) == {"metrics"}
+
+
+def test_a_network_is_measured_beside_the_minimum_of_its_own_energies_whatever_its_batch(plan):
+    own = find_own_reference(find_method("snug-no-gravity"))
+    cells = [Cell(KICK, entry, 0, ("garments",)) for entry in (find_method("snug-no-gravity"), own)]
+    tasks = {task.id: task for task in tasks_of(dataclasses.replace(plan, cells=(*CELLS, *cells)))}
+    assert cells[1].id() in tasks[cells[0].id("metrics")].reads
