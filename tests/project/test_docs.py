@@ -13,7 +13,10 @@ from pathlib import Path
 import pytest
 
 from benchmarks import run as benchmarks_run
+from tests.benchmarks.plan.outside_files import as_before
 from tests.benchmarks.runner.tasks_by_hand import run_in_this_process
+
+_as_before = pytest.fixture(autouse=True)(as_before)
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), *ROOT.glob("studies/*/*.md")])
