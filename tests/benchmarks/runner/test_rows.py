@@ -92,7 +92,9 @@ def test_rows_of_a_cell_stand_in_each_suite_and_tell_what_is_not_finite():
     assert skinned[0].dtype == "float32"
     skipped = rows(cell, Outcome("skipped", "why"))
     assert [(row.status, row.reason, row.value) for row in skipped] == [("skipped", "why", None)] * 2
-    untimed = Cell(dataclasses.replace(SHEET, metrics=("geometry",)), find_method("newton-1"), 0, ("garments",))
+    untimed = dataclasses.replace(
+        cell, scene=dataclasses.replace(SHEET, metrics=("geometry",)), suites=("a",)
+    )
     (bare,) = rows(untimed, RAN, {})
     assert (bare.status, bare.reason) == ("skipped", "no metric that the scene names applies to it")
 
