@@ -13,13 +13,12 @@ from reports.statistics.verdicts import compare_methods
 from reports.tables.table import GARMENT, METHOD, SCENE, SUITE, Cell, Column, Table, metric_column, table
 
 
-def metric_tables(run: Run, only: str = "") -> list[Table]:
-    """Return the table of each name that metrics of the run declare, or of the name `only`.
+def metric_tables(run: Run) -> list[Table]:
+    """Return the table of each name that metrics of the run declare.
 
     Where no garment has a number of it, the table is NAME_by_scene.
     """
-    declared = dict.fromkeys(metric.table for metric in run.metrics.values() if metric.table)
-    names = [name for name in declared if only in ("", name)]
+    names = dict.fromkeys(metric.table for metric in run.metrics.values() if metric.table)
     return [table for name in names for table in _average_motions(run, name) or _average_seeds(run, name)]
 
 
