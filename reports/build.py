@@ -81,11 +81,13 @@ def build_row(run_dir: str | Path) -> str:
     """Write for_your_paper.csv and .tex alone; return their table as text."""
     from reports.finished_run import read_run  # loads pandas
     from reports.text.for_your_paper import write_paper_table
-    from reports.text.text_table import markdown_table, text_rows
+    from reports.text.text_table import markdown_table, remarks_on, text_rows
 
     folder = RunFolder(run_dir)
     run = read_run(folder)
-    return markdown_table(text_rows(run, write_paper_table(folder, run)))
+    lines = text_rows(run, write_paper_table(folder, run))
+    rows = [[text.removeprefix("+") for text in line] for line in lines]
+    return "\n".join(filter(None, (markdown_table(rows), remarks_on(rows))))
 
 
 def save_still(run_dir: str | Path, method: str, path: Path) -> None:

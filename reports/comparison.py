@@ -54,7 +54,7 @@ def _intersect(frames: Sequence[pd.DataFrame], *columns: str) -> list[pd.DataFra
 def find_losses(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
     """Return a line for each method or metric that the later run lacks somewhere."""
     keys = [frame.set_index(CELL).index for frame in (one, other)]
-    missing = one[~keys[0].isin(keys[1])].astype({"method": str, "metric": str})
+    missing = one[one["usable"] & ~keys[0].isin(keys[1])].astype({"method": str, "metric": str})
     lacking = missing.set_index(CELL[:3]).index.isin(other.set_index(CELL[:3]).index)
     missing["metric"] = missing["metric"].where(lacking, "all metrics")
     changes = []
@@ -68,9 +68,13 @@ def find_losses(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
 def endings(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
     """Return cells, checks and stress tests that ended well in one run alone; each cell once."""
     both = one.merge(other, on=CELL, suffixes=("", "_other"))
-    # Whatever the later run says.
-    off = (both["value_other"] - both["expected"]).abs() > both["tolerance"]
-    both.loc[off & (both["status_other"] == "ok"), ["status_other", "reason_other"]] = "failed", "off"
+    # Whatever the later run says; an engine that was off before violates a law, which is a result.
+    off, was_off = (
+        ((both[f"value{end}"] - both["expected"]).abs() > both["tolerance"])
+        & (both[f"status{end}"] == "ok")
+        for end in ("_other", "")
+    )
+    both.loc[off & ~was_off, ["status_other", "reason_other"]] = "failed", "off"
     # A cell that failed has one row, of a metric that it need not have where it ends well.
     cells = _pick_worst(one).merge(_pick_worst(other), on=CELL[:3], suffixes=("", "_other"))
     rows = pd.concat([both, cells], ignore_index=True)
@@ -84,6 +88,16 @@ def endings(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
         )
         for row in moved.itertuples()
     ]  # fmt: skip
+
+
+def _find_fallen(run: Run, frames: Sequence[pd.DataFrame], basis: pd.DataFrame) -> list[Change]:
+    """Return roll-outs that are worn in one run alone: what fell off has no relative excess to compare."""
+    excesses = [add_excess(run, frame, basis=basis) for frame in frames]
+    rows = [frame[frame["metric"] == RELATIVE_EXCESS.name] for frame in excesses]
+    status, reason = {True: "ok", False: "failed"}, {True: "", False: "fell off the body"}
+    return endings(
+        *(f.assign(status=f["usable"].map(status), reason=f["usable"].map(reason)) for f in rows)
+    )
 
 
 def _pick_worst(frame: pd.DataFrame) -> pd.DataFrame:
@@ -102,7 +116,7 @@ class Comparison:
 
     Attributes:
         changes: what is gone and worse first.
-        compared: number of means.
+        compared: number of means that were judged.
         headline: method -> for each metric of HEADLINE both means with the verdict, SNUG first.
     """
 
@@ -138,8 +152,9 @@ def compare(
     _check_scenes(one, other)
     cells = [_cells(run) for run in (one, other)]
     frames = [frame[_match(frame["method"], methods)] for frame in cells]
-    of_cells = endings(*frames)
-    of_metrics = [frame[_match(frame["metric"], metrics)] for frame in frames]
+    of_cells = [*endings(*frames), *_find_fallen(one, frames, cells[0])]
+    names = metrics.replace("relative_excess/", "energy/")  # of which changes of those are made
+    of_metrics = [frame[_match(frame["metric"], names)] for frame in frames]
     if not times or set(one.frame["hardware"]) != set(other.frame["hardware"]):
         machines = [m.name for run in (one, other) for m in run.metrics.values() if m.of == "machine"]
         of_metrics = [frame[~frame["metric"].isin(machines)] for frame in of_metrics]
@@ -161,7 +176,8 @@ def compare(
     networks = set(lone_seeds[1]["method"])
     both = [frame[~(frame["seeded"] & frame["method"].isin(networks))] for frame in both]
     of_means, count = _means(one, *_cap_noise(*both), basis=cells[0])
-    earlier, later = _replace_energies(one, *lone_seeds, basis=cells[0])
+    excesses = _replace_energies(one, *lone_seeds, basis=cells[0])
+    earlier, later = _intersect([f[f["usable"]] for f in excesses], "scene", "method", "metric")
     of_one_seed = compare_scenes(earlier, later, _metrics(one))
     order = (GONE, WORSE, BETTER, OTHER)
     changes = sorted([*losses, *of_cells, *of_means, *of_one_seed], key=lambda c: order.index(c.verdict))
@@ -190,7 +206,8 @@ def _headline(
     headline = {}
     for method in sorted(names, key=lambda name: name != NETWORK):
         seeds = [set(f[(f["method"] == method) & f["seeded"]]["seed"]) for f in rows]
-        verdict = "one seed" if len(seeds[0]) == len(seeds[1]) == 1 else "same"
+        judged = not seeds[0] or len(seeds[0] & seeds[1]) > 1 or len(seeds[0]) > len(seeds[1]) == 1
+        verdict = "same" if judged else "one seed" if len(seeds[0]) == 1 else "other seeds"
         cells = []
         for metric in HEADLINE:
             pair = clip_rows if metric == WHOLE and clips else rows
@@ -198,7 +215,7 @@ def _headline(
             verdicts = {c.place: c.verdict for c in changes if (c.method, c.metric) == (method, metric)}
             scenes = " and ".join(sorted({f"{change} in a scene" for change in verdicts.values()}))
             note = verdicts.get(garment) or scenes or verdict
-            whole = before is not None and after is not None
+            whole = before is not None and (after is not None or bool(verdicts))
             cells.append(f"{number(before)} → {number(after)} {note}" if whole else DASH)
         if set(cells) != {DASH}:
             headline[method] = cells
@@ -256,12 +273,11 @@ def _cells(run: Run) -> pd.DataFrame:
     frame = frame[frame["status"] != "skipped"]
     is_garment = (frame["suite"] == "garments") & (frame["garment"] != "")
     frame = frame.assign(place=frame["garment"].where(is_garment, frame["scene"]))
-    cell = ["scene", "method", "seed"]
     inference, repeats = (
-        frame[frame["metric"] == name].set_index(cell)["value"] for name in (TIME, REPEATS)
+        frame[frame["metric"] == name].set_index(CELL[:3])["value"] for name in (TIME, REPEATS)
     )
     timed = frame["metric"].isin((TIME, WHOLE))  # inference alone is repeated, its inputs are not
-    ranges = (inference * repeats / 100.0).reindex(pd.MultiIndex.from_frame(frame.loc[timed, cell]))
+    ranges = (inference * repeats / 100.0).reindex(pd.MultiIndex.from_frame(frame.loc[timed, CELL[:3]]))
     frame.loc[timed, "uncertainty"] = ranges.to_numpy()
     # Another run has another reference: uncertainties add up.
     return frame[frame["metric"] != REPEATS].drop(columns="moved")
@@ -275,21 +291,24 @@ def _match(names: pd.Series, patterns: str) -> pd.Series:
 def _means(
     run: Run, one: pd.DataFrame, other: pd.DataFrame, *, basis: pd.DataFrame
 ) -> tuple[list[Change], int]:
-    """Return changes, and the number of means.
+    """Return changes, and the number of means that were judged.
 
     basis: all rows of the earlier run, whatever methods and metrics are compared.
     """
     rows = _select_common(*_replace_energies(run, one, other, basis=basis))
     first, second = (means(frame, *GROUP).to_dict() for frame in rows)
-    differ = {key: (mean, second[key]) for key, mean in first.items() if mean.cells != second[key].cells}
+    judged = {
+        key: mean for key, mean in first.items()
+        if key[-1] != WORST and (not mean.seeded or mean.seeds > 1)
+    }  # fmt: skip
     metrics = _metrics(run)
     scales = (
         rows[0].groupby(["place", "metric"])["value"].agg(lambda values: values.abs().median()).to_dict()
     )
     candidates = [
         (place, method, metric := metrics[name], mean, new, _effect(metric, new, mean))
-        for (place, method, name), (mean, new) in differ.items()
-        if name != WORST and (not mean.seeded or mean.seeds > 1)
+        for (place, method, name), mean in judged.items()
+        if mean.cells != (new := second[place, method, name]).cells
     ]
     p_values = [shift.p_value() for *_, shift in candidates]
     corrected = iter(holm([p for p in p_values if p is not None]))
@@ -313,7 +332,7 @@ def _means(
     before, after = (frame[frame["scene"].isin(garments)] for frame in rows)
     of_scenes = compare_scenes(before, after, metrics)
     changes += [c for c in of_scenes if (garments[c.place], c.method, c.metric) not in reported]
-    return changes, len(first)
+    return changes, len(judged)
 
 
 def _replace_energies(run: Run, *frames: pd.DataFrame, basis: pd.DataFrame) -> list[pd.DataFrame]:
@@ -322,13 +341,13 @@ def _replace_energies(run: Run, *frames: pd.DataFrame, basis: pd.DataFrame) -> l
     Of energies whose zero is a choice, in scenes whose reference and skinning the basis has.
     """
     shares = []
+    energies = {relative_metric(m.name).name: m.name for m in run.metrics.values() if m.arbitrary_zero}
     for frame in frames:
-        for metric in (m for m in run.metrics.values() if m.arbitrary_zero):
-            frame = add_excess(run, frame, metric.name, basis=basis)
-            excess = frame[frame["metric"] == relative_metric(metric.name).name]
-            covered = frame.set_index(CELL[:3]).index.isin(excess.set_index(CELL[:3]).index)
-            frame = frame[~(covered & (frame["metric"] == metric.name))]
-        shares.append(frame)
+        for energy in energies.values():
+            frame = add_excess(run, frame, energy, basis=basis)
+        excess = frame[frame["metric"].isin(energies)]
+        covered = excess.assign(metric=excess["metric"].map(energies)).set_index(CELL).index
+        shares.append(frame[~frame.set_index(CELL).index.isin(covered)])
     return shares
 
 

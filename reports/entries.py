@@ -145,8 +145,8 @@ def entries_tables(
     """Return a table for each protocol and set of scenes, full ones first, and whom its rows are of.
 
     No table has rows of two protocols, or means over different scenes. Methods of the published run of
-    that name stand in each table of their protocol. Rows are sorted by relative excess, rows without it
-    last.
+    that name stand in each table of their protocol. Rows are sorted by relative excess; rows without it, or
+    with roll-outs that are missing or fell off, are last.
     """
     full = full_scenes(run)
     groups: dict[tuple[str, tuple[str, ...]], list[Scored]] = {(run.protocol, tuple(sorted(full))): []}
@@ -167,7 +167,7 @@ def entries_tables(
 
 
 def _excess(cells: tuple[Cell, ...]) -> float:
-    return cells[2].shown if isinstance(cells[2], Effect) else float("inf")
+    return cells[2].shown if isinstance(cells[2], Effect) and cells[2].complete else float("inf")
 
 
 def page_of(folder: Path, name: str, run: Run) -> str:

@@ -124,13 +124,8 @@ class Run:
         """
         rows = self.suite("garments")
         rows = rows[rows["garment"] != ""]
-        unseen = rows[~rows["scene"].isin(self.trained_on)]
+        unseen = rows[~rows["scene"].isin(self.with_motion("training"))]
         return rows if unseen.empty else unseen
-
-    @property
-    def trained_on(self) -> list[str]:
-        """Scenes whose motion networks trained on, as a user can name them."""
-        return self.with_motion("training")
 
     def with_motion(self, role: str) -> list[str]:
         """Return the scenes, as declared, whose motion has that role: training, validation or test."""
@@ -219,10 +214,7 @@ def make_run(config: Mapping[str, Any], rows: Sequence[Row], changed: Sequence[s
     frame["usable"] = frame["status"].isin(USABLE) & finite
     declared = config.get("metrics") or {}
     units = dict(zip(frame["metric"], frame["unit"]))
-    names = [
-        *(name for name in declared if name in units),
-        *(name for name in units if name not in declared),
-    ]
+    names = [name for name in dict.fromkeys([*declared, *units]) if name in units]
     metrics = {name: _metric(name, units[name], declared.get(name) or {}) for name in names}
     frame["table"] = frame["metric"].map({name: metric.table for name, metric in metrics.items()})
     frame["case"] = _cases(frame, config.get("cases") or {})

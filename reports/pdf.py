@@ -15,7 +15,7 @@ import typst
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.files.atomic_files import replacing
 from reports.blocks import BLOCKS, Heading, Report, TableBlock
-from reports.figures.plotting import Figure, Picture, escape
+from reports.figures.plotting import Figure, escape
 from reports.finished_run import Run
 from reports.sentences import headline
 from reports.tables.table import CellText, Column, Table, column_texts, remarks_below
@@ -52,21 +52,14 @@ FEW = 5  # up to so many columns, the columns of a table share its width evenly
 def lay_out(report: Report, block: Figure | TableBlock) -> list[Values]:
     """Return the values of a block, none where the report has no content for it."""
     if isinstance(block, Figure):
-        picture = report.pictures.get(block.name)
-        return [_figure(picture)] if picture else []
+        if not (picture := report.pictures.get(block.name)):
+            return []
+        path = f"figures/{picture.path.name}"
+        return [{"kind": "figure", "path": path, "caption": picture.caption, "width": picture.width}]
     if block.name not in report.tables:
         return []
     table = block.cut_table(report.tables[block.name])
     return [lay_out_table(report.run, table)] if table.rows else []
-
-
-def _figure(picture: Picture) -> Values:
-    return {
-        "kind": "figure",
-        "path": f"figures/{picture.path.name}",
-        "caption": picture.caption,
-        "width": picture.width,
-    }
 
 
 def lay_out_table(run: Run, table: Table) -> Values:

@@ -263,6 +263,8 @@ def worst_frame(run: Run) -> Drawing | None:
     if not {network, run.reference} <= set(totals):
         return None
     above = (totals[network] - totals[run.reference]).dropna()
+    if above.empty:
+        return None
     scene, seconds = above.idxmax()
     if not (group := _gather(run, scene)):
         return None

@@ -90,9 +90,8 @@ def is_negligible(metric: Metric, mean: Mean, new: Mean, shift: Effect, scale: f
     if abs(new.value - mean.value) <= FLOOR * scale:
         return True
     share = tolerance_of(metric)
-    if shift.scale == DIFFERENCE:
-        return abs(shift.value) <= share * (shift.unit or scale)
-    return max(shift.shown, 1.0 / shift.shown) <= 1.0 + share if shift.shown > 0.0 else False
+    limit = share * (shift.unit or scale) if shift.scale == DIFFERENCE else math.log1p(share)
+    return abs(shift.value) <= limit
 
 
 ODD = 3.0  # times the median scatter of scenes, beyond which a scene is left out of the pooled scatter

@@ -73,14 +73,13 @@ def verdict(run: Run, frame: pd.DataFrame) -> str:
     It is the user's own, or else the first network of page one that these rows have.
     """
     names = [name for name in leads(run, frame) if run.methods[name].role in (*LEARNED, EXTERNAL)]
-    rows = add_excess(run, frame)
-    excesses = {name: excess for name in names if (excess := excess_of(run, rows, name))}
+    excesses = {name: excess for name in names if (excess := excess_of(run, frame, name))}
     if not excesses:
         return ""
     name = min(excesses, key=lambda name: run.methods[name].role != EXTERNAL)
     excess = excesses[name]
     # Those in which skinning has an excess: a network that failed in one has a remark on it.
-    scenes = set(rows[(rows["metric"] == RELATIVE_EXCESS.name) & rows["usable"]]["scene"])
+    scenes = set(frame[(frame["metric"] == RELATIVE_EXCESS.name) & frame["usable"]]["scene"])
     several = run.garment_rows["garment"].nunique() > 1
     motion = "motion" + f" of the {run.first_garment}" * several
     text = (
@@ -114,7 +113,7 @@ def likeness(correlation: float) -> str:
 
 def _kind(run: Run, scenes: Collection[str]) -> str:
     """Return what these scenes' motions are to the networks, before the word "motions"."""
-    if set(scenes) <= set(run.trained_on):
+    if set(scenes) <= set(run.with_motion("training")):
         return ""
     return "validation " if set(scenes) <= set(run.with_motion("validation")) else "unseen "
 

@@ -196,6 +196,6 @@ def read_frame_energies(path: Path) -> pd.DataFrame:
         if tuple(columns[: len(CELL)]) != CELL or len(columns) == len(CELL):
             raise ValueError(f"the columns should be {','.join(CELL)} and energies")
         return table.replace("", "nan").astype({"seed": int, **dict.fromkeys(columns[3:], float)})
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, EOFError) as error:
         reason = " ".join(str(error).split())
         raise ResultsError(f"{path}: not readable as CSV in UTF-8 ({reason})") from None

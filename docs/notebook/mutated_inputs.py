@@ -1,5 +1,5 @@
 # ruff: noqa: E501
-"""Mutated inputs with their ends fixed beforehand: python docs/notebook/mutated_inputs.py [COUNT [SEED]].
+"""Mutated inputs with their ends fixed beforehand: PYTHONPATH=. python docs/notebook/mutated_inputs.py [COUNT [SEED]].
 
 Each kind of file has mutations that change nothing ("same") and mutations that leave no meaning
 ("refused"). An input has up to two of the first and, in two of three cases, one of the second. A reader
@@ -275,12 +275,11 @@ MOTION_ARRAYS = (
      lambda arrays, draw: {**arrays, "dmpls": np.zeros((40, 8))}],
     [without("poses", "trans", "mocap_framerate"), spoil("poses", np.nan, np.inf, 1e9, 300.0), spoil("trans", np.nan, np.inf, 1e7, 50.0),
      setting("poses", np.degrees), setting("poses", lambda x: x[:-1]), setting("trans", lambda x: x[:, :2]),
-     setting("trans", lambda x: x[1:]), setting("trans", lambda x: 1000 * x), setting("mocap_framerate", lambda x: draw_rate),
+     setting("trans", lambda x: x[1:]), setting("trans", lambda x: 1000 * x), setting("mocap_framerate", lambda x: np.nan),
      setting("poses", lambda x: joint_positions(x.reshape(40, 24, 3), GOOD.translations).reshape(40, 72)),
      setting("poses", lambda x: x.astype(complex)), setting("poses", lambda x: x.astype(str)), setting("poses", lambda x: x[:0]),
      setting("poses", lambda x: x.reshape(40, 72)[:, :70]), setting("mocap_framerate", lambda x: np.array([30.0, 60.0]))],
 )  # fmt: skip
-draw_rate = np.nan
 CORNERS, FACES = sphere(1, 0.5)
 ROLL_OUT: Arrays = {"positions": np.stack([CORNERS, CORNERS + 0.1]), "faces": FACES, "fps": 30.0}
 ROLL_OUT_ARRAYS = (
@@ -370,17 +369,17 @@ def save(path: Path, arrays: Arrays) -> None:
 
 
 class BinaryKind(Kind):
-    """A binary file: cut, or under a name in capitals."""
+    """A binary file: spoilt, or as it is."""
 
     def mutate(self, path: Path, draw: random.Random, spoil: bool) -> list[str]:
-        """Cut the file, or fill it with zeros from somewhere on."""
+        """Cut the file at either end, or put other bytes in its place."""
         data = path.read_bytes()
         at = draw.randrange(1, int(0.97 * len(data)))
         if spoil:
             path.write_bytes(
                 draw.choice([data[:at], data[:at], draw.randbytes(200), data[len(data) - at :]])
             )
-        return [f"bytes cut at {at} of {len(data)}"]
+        return [f"bytes cut at {at} of {len(data)}" if spoil else "nothing"]
 
 
 class SequenceKind(Kind):

@@ -196,7 +196,9 @@ def _draw_page_one(
     axes.set(xlabel=time_label(time), ylabel=metric.heading)
     fit(figure, entries, markers=True)
     scene = name_scene(rows["scene"].iloc[0])
-    caption = f"{scene}: lower left is better. Pale line: the best at each time."
+    caption = f"{scene}: lower left is better."
+    if any(line.get_color() == FRONT for line in axes.lines):
+        caption += " Pale line: the best at each time."
     for solvers in (c for c in curves if c.look is SOLVERS):
         first, last = (run.label(solvers.points[end].method) for end in (0, -1))
         caption += f" {SOLVERS.label}: from {first} to {last}"
@@ -270,8 +272,10 @@ def energy_series(run: Run) -> Drawing | None:
 
 
 def _frames(run: Run) -> tuple[str, pd.DataFrame]:
-    """Return the first motion of frame_energies.csv and its lines, of the seed shown of each method."""
+    """Return the first motion of frame_energies.csv with rows, its lines of the seed shown of each method."""
     frames = run.frame_energies
+    if len(frames):
+        frames = frames[frames["scene"].isin(set(run.frame["scene"]))]
     if frames.empty:
         return "", frames
     scene = str(frames["scene"].iloc[0])

@@ -1,4 +1,4 @@
-// What packed_arrays.py wrote, as arrays again.
+// What embedded_roll_outs.py wrote, as arrays again.
 
 async function inflated(id) {
   const letters = atob(document.getElementById(id).textContent);

@@ -106,11 +106,8 @@ def _column(run: Run, column: Column) -> dict[str, Any]:
     if better is not None:
         definition += f"; {'lower' if better else 'higher'} is better"
     return {
-        "title": column.title,
-        "unit": column.unit_above,
-        "words": column.text,
-        "definition": definition,
-    }
+        "title": column.title, "unit": column.unit_above, "words": column.text, "definition": definition,
+    }  # fmt: skip
 
 
 def _cell(text: dict[str, str], cell: Cell) -> str | list[Any]:
@@ -118,22 +115,19 @@ def _cell(text: dict[str, str], cell: Cell) -> str | list[Any]:
     value = cell.shown if isinstance(cell, Effect) else cell.value if isinstance(cell, Mean) else cell
     if isinstance(value, str):
         return text["text"]
-    number = None if value is None or math.isnan(value) else max(min(float(value), 1e300), -1e300)
-    # The last digits of a mean differ between processors; a page that is kept must not.
-    return [
-        text["text"],
-        None if number is None else float(f"{number:.12g}"),
-        text["spread"],
-        text["mark"],
-    ]
+    number = None
+    if value is not None and not math.isnan(value):
+        # The last digits of a mean differ between processors; a page that is kept must not.
+        number = float(f"{max(min(float(value), 1e300), -1e300):.12g}")
+    return [text["text"], number, text["spread"], text["mark"]]
 
 
 HERE = Path(__file__).parent
 SCRIPTS = ("data", "draw", "view", "plots", "tables", "share", "page")  # in this order
 
 
-def write_page(folder: RunFolder, report: Report, *, budget: int = BUDGET) -> Path:
-    """Write report.html whole or not at all; return its path.
+def write_page(folder: RunFolder, report: Report, *, budget: int = BUDGET) -> None:
+    """Write report.html whole or not at all.
 
     budget: [bytes] of the page; roll-outs that do not fit are left out, and named.
     """
@@ -150,7 +144,6 @@ def write_page(folder: RunFolder, report: Report, *, budget: int = BUDGET) -> Pa
     page = _page(report, content, embedded)
     with replacing(folder.page_path) as temporary:
         temporary.write_text(page, encoding="utf-8", newline="\n")
-    return folder.page_path
 
 
 def _page(report: Report, content: dict[str, Any], embedded: Embedded) -> str:

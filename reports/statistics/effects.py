@@ -25,24 +25,20 @@ RANGE = "range"  # what the limits of a cost are
 def rescale(values: np.ndarray | float, scale: str) -> np.ndarray | float:
     """Return values on a scale where effects add up: logarithm, arcsinh(x / SOFTENING), or as they are.
 
-    >>> rescale(1.0, RATIO), rescale(0.0, EXCESS), rescale(2.0, DIFFERENCE)
-    (0.0, 0.0, 2.0)
+    >>> [float(rescale(x, scale)) for x, scale in ((1.0, RATIO), (0.0, EXCESS), (2.0, DIFFERENCE))]
+    [0.0, 0.0, 2.0]
     """
     if scale == RATIO:
-        return _unwrap(np.log(values))
-    return _unwrap(np.arcsinh(np.divide(values, SOFTENING))) if scale == EXCESS else values
+        return np.log(values)
+    return np.arcsinh(np.divide(values, SOFTENING)) if scale == EXCESS else values
 
 
 def unscale(values: np.ndarray | float, scale: str) -> np.ndarray | float:
     """Return what `rescale` makes these values of."""
     if scale == RATIO:
         with np.errstate(over="ignore"):  # a few seeds of what broke can leave the upper end open
-            return _unwrap(np.exp(values))
-    return _unwrap(SOFTENING * np.sinh(values)) if scale == EXCESS else values
-
-
-def _unwrap(values: np.ndarray | np.floating) -> np.ndarray | float:
-    return float(values) if np.ndim(values) == 0 else np.asarray(values)
+            return np.exp(values)
+    return SOFTENING * np.sinh(values) if scale == EXCESS else values
 
 
 @dataclass(frozen=True)
@@ -105,7 +101,10 @@ class Effect:
         """Ends of the interval on the scale."""
         if self.error is None:
             return self.limits
-        reach, (low, high) = self._quantile * self.error, self.possible
+        from scipy import stats
+
+        reach = float(stats.t.ppf(1.0 - LEVEL / 2.0, self.freedom)) * self.error
+        low, high = self.possible
         return max(self.value - reach, low), min(self.value + reach, high)
 
     @property
@@ -159,12 +158,6 @@ class Effect:
             )
             return float(unscale(first, EXCESS)) - float(unscale(second, EXCESS))
         return float(unscale(value, self.scale))
-
-    @property
-    def _quantile(self) -> float:
-        from scipy import stats
-
-        return float(stats.t.ppf(1.0 - LEVEL / 2.0, self.freedom))
 
 
 def effect(one: Mean, other: Mean, scale: str = "", *, unit: float | None = None) -> Effect:
@@ -328,10 +321,8 @@ def _bootstrap(grids: Sequence[np.ndarray]) -> tuple[float, float]:
     parts = np.array([part.var() for part in marginals])
     free = np.array([len(grids[0]), *(grid.shape[1] for grid in grids)]) - 1
     terms = parts[free > 0] ** 2 / free[free > 0]
-    # Where only motion and seed together scatter, nothing tells: the fewest that any factor has.
-    freedom = (
-        parts.sum() ** 2 / terms.sum() if terms.sum() > 0.0 else float(free[free > 0].min(initial=1))
-    )
+    # Where only motion and seed together scatter, nothing tells: the fewest there can be.
+    freedom = parts.sum() ** 2 / terms.sum() if terms.sum() > 0.0 else 1.0
     return float(np.std(draws)), float(freedom)
 
 

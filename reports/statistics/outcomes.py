@@ -26,11 +26,6 @@ def checks(run: Run) -> pd.DataFrame:
     return rows[checked & (rows["status"] != "skipped")]
 
 
-def check_name(run: Run, row: Any) -> str:
-    """Return the name of a check: its case, or the scene and the metric that is judged there."""
-    return row.case or f"{row.scene}: {run.metrics[row.metric].title}"
-
-
 def tolerances_away(row: Any) -> float | None:
     """Return |measured - expected| / tolerance; of a number that must be exact 0 or infinite."""
     distance = abs(row.value - row.expected)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import pandas as pd
@@ -39,16 +39,15 @@ class Point:
     error_spread: float = 0.0
 
 
-def points_of(run: Run, frame: pd.DataFrame, scenes: Sequence[str], metric: str) -> list[Point]:
+def points_of(run: Run, rows: pd.DataFrame, metric: str) -> list[Point]:
     """Return a point for each method that has both numbers in all the scenes and seeds.
 
-    frame: rows of the run. scenes: over which means are taken, over seeds too that came through all of
-    them. metric: of the error.
+    rows: of the scenes over which means are taken, over seeds too that came through all of them. metric:
+    of the error.
     """
-    rows = frame[frame["scene"].isin(list(scenes))]
     x = run_time(rows)
     measured = rows[rows["usable"] & rows["metric"].isin([metric, x])].groupby(["method", "seed"]).size()
-    whole = measured.index[measured == 2 * len(scenes)]
+    whole = measured.index[measured == 2 * rows["scene"].nunique()]
     in_all = rows.set_index(["method", "seed"]).index.isin(whole)
     rows = rows.assign(usable=rows["usable"] & in_all)
     rows = rows[rows["metric"].isin([metric, x, TIME, REPEATS]) | ~rows["usable"]]
@@ -133,7 +132,7 @@ def select_plot_cells(run: Run) -> tuple[pd.DataFrame, list[str]]:
 
 def error_points(run: Run, rows: pd.DataFrame, metric: str) -> list[Point]:
     """Return the points of one panel, without the reference, whose error is zero."""
-    points = points_of(run, rows, list(dict.fromkeys(rows["scene"])), metric)
+    points = points_of(run, rows, metric)
     # Smaller steps have errors of the garment, but none of the reference's own step.
     left_out = (SMALLER_STEPS,) if metric in OWN_STEP else ()
     others = [p for p in points if p.method != run.reference and p.time > 0.0]
@@ -148,7 +147,7 @@ def rivals(run: Run, timed: pd.DataFrame) -> list[str]:
     """Return the solvers that SNUG competes with: the reference, and the fastest ones as accurate."""
     names = [run.reference] if mean_of(timed, run.reference, TIME) else []
     for metric in ACCURACIES:
-        points = points_of(run, timed, list(dict.fromkeys(timed["scene"])), metric)
+        points = points_of(run, timed, metric)
         network = next((p for p in points if p.method == NETWORK), None)
         best = find_fastest(solvers(run, points), network.error) if network else None
         names += [best.method] if best else []

@@ -62,8 +62,9 @@ def add_excess(
 ) -> pd.DataFrame:
     """Return the rows, and a row of the relative excess of each usable row of the metric.
 
-    Scenes without the reference or skinning have none, nor those in which skinning has no excess; below
-    LEAST it is not usable. Rows that have relative excesses of the metric already come back as they are.
+    Scenes without the reference or skinning have none, nor those in which skinning has no excess. One is not
+    usable where that of the cell's total, or its own in a cell without a total, is below LEAST. Rows that
+    have relative excesses of the metric already come back as they are.
 
     Args:
         run: declares the reference and its family, of which members that stalled are left out.
@@ -77,10 +78,11 @@ def add_excess(
     sound = basis[(basis["status"] == "ok") | ~basis["method"].isin(run.reference_family)]
     zeros = _values(sound, metric, [run.reference, *run.reference_family])
     totals = _values(sound, TOTAL, [run.reference, *run.reference_family, SKINNING])
-    lines = rows[(rows["metric"] == metric) & rows["usable"]]
+    lines, wholes = (rows[(rows["metric"] == name) & rows["usable"]] for name in (metric, TOTAL))
+    whole = wholes.set_index(["scene", "method", "seed"])["value"].to_dict()
     parts = []
-    columns = (lines[name].tolist() for name in ("scene", "method", "value", "uncertainty"))
-    for place, scene, method, energy, uncertainty in zip(lines.index, *columns):
+    columns = (lines[name].tolist() for name in ("scene", "method", "seed", "value", "uncertainty"))
+    for place, scene, method, seed, energy, uncertainty in zip(lines.index, *columns):
         zero, total = zeros.get(scene, {}), totals.get(scene, {})
         shares = _shares(energy, zero, total)
         if run.reference in shares:
@@ -88,13 +90,15 @@ def add_excess(
             # The reference is zero by definition, whichever simulation it is.
             moved = () if method == run.reference else tuple((k, v - value) for k, v in shares.items())
             share = 100.0 / (total[SKINNING] - total[run.reference])
-            parts.append((place, value, share * uncertainty, moved))
+            own = whole.get((scene, method, seed))
+            worn = (value if own is None else share * (own - total[run.reference])) >= LEAST
+            parts.append((place, value, share * uncertainty, moved, worn))
     if not parts:
         return rows
     excesses = lines.loc[[place for place, *_ in parts]].assign(
         metric=relative_metric(metric).name, unit="%", value=[value for _, value, *_ in parts],
-        uncertainty=[uncertainty for *_, uncertainty, _ in parts], moved=[moved for *_, moved in parts],
-        usable=[value >= LEAST for _, value, *_ in parts],
+        uncertainty=[uncertainty for *_, uncertainty, _, _ in parts],
+        moved=[moved for *_, moved, _ in parts], usable=[worn for *_, worn in parts],
     )  # fmt: skip
     return pd.concat([rows, excesses[rows.columns]], ignore_index=True)
 

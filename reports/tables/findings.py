@@ -12,7 +12,7 @@ from benchmarks.results.protocol import STARTS
 from reports.finished_run import Run
 from reports.statistics.effects import EXCESS, unscale
 from reports.statistics.means_and_spreads import AT_REFERENCE, count_spreads
-from reports.statistics.outcomes import check_name, checks, stress_tests, tolerances_away
+from reports.statistics.outcomes import checks, stress_tests, tolerances_away
 from reports.statistics.paper_claims import judge_claims
 from reports.statistics.relative_excess import (
     LEAST,
@@ -156,9 +156,6 @@ def errors_in_spreads(run: Run) -> list[Table]:
     return table("errors_in_spreads", columns, lines, caption, grouped_by=("garment",))
 
 
-REASON = Column("reason", "Reason", text=True)
-
-
 def validation(run: Run) -> list[Table]:
     """List the checks: measured against expected; one without a tolerance is reported, not judged.
 
@@ -166,16 +163,11 @@ def validation(run: Run) -> list[Table]:
     """
     lines = [
         (
-            check_name(run, row),
-            row.unit,
-            row.value,
-            row.expected,
-            row.tolerance,
-            tolerances_away(row),
-            _result(row),
+            row.case or f"{row.scene}: {run.metrics[row.metric].title}", row.unit, row.value, row.expected,
+            row.tolerance, tolerances_away(row), _result(row),
         )
         for row in checks(run).itertuples()
-    ]
+    ]  # fmt: skip
     columns = (
         Column("check", "Check", text=True),
         Column("unit", "Unit", text=True),
@@ -219,7 +211,8 @@ def list_unfinished(run: Run) -> list[Table]:
     names = ["suite", "scene", "method", "seed", "status", "reason"]
     lines = rows[names].drop_duplicates().itertuples(index=False)
     columns = (SUITE, SCENE, METHOD,
-        Column("seed", "Seed", text=True), Column("status", "Status", text=True), REASON)  # fmt: skip
+        Column("seed", "Seed", text=True), Column("status", "Status", text=True),
+        Column("reason", "Reason", text=True))  # fmt: skip
     cells = [(*line[:5], line[5] or "no reason given") for line in lines]
     return table(
         "unfinished", columns, cells, "Cells that failed or were skipped, with the reason of each."

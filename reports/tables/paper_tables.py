@@ -117,9 +117,10 @@ def _curvature(run: Run, means: pd.Series, name: str, base: str) -> list[Table]:
         Column("paper", "Error in the paper", trim=True),
         Column("ratio_paper", "Over full, in the paper", digits=2),
     )  # fmt: skip
+    below = any(line[-1] is None for line in lines)  # of which the paper has no number
+    floor = " Below: the reference from another start or with smaller time steps, a floor of the errors."
     caption = (
         f"The paper's table 2 beside curvature of {run.label(base)} against the reference, means over the "
-        "frames of the motions. Below: the reference from another start or with smaller time steps, a floor "
-        "of the errors. The paper states neither operator nor unit of its error."
+        f"frames of the motions.{floor * below} The paper states neither operator nor unit of its error."
     )
     return table(name, columns, lines, caption, grouped_by=("motions",))

@@ -13,13 +13,12 @@ from reports.statistics.verdicts import compare_methods
 from reports.tables.table import GARMENT, METHOD, SCENE, SUITE, Cell, Column, Table, metric_column, table
 
 
-def metric_tables(run: Run, only: str = "") -> list[Table]:
-    """Return the table of each name that metrics of the run declare, or of the name `only`.
+def metric_tables(run: Run) -> list[Table]:
+    """Return the table of each name that metrics of the run declare.
 
     Where no garment has a number of it, the table is NAME_by_scene.
     """
-    declared = dict.fromkeys(metric.table for metric in run.metrics.values() if metric.table)
-    names = [name for name in declared if only in ("", name)]
+    names = dict.fromkeys(metric.table for metric in run.metrics.values() if metric.table)
     return [table for name in names for table in _average_motions(run, name) or _average_seeds(run, name)]
 
 
@@ -131,8 +130,10 @@ def shapes(run: Run) -> list[Table]:
         return []
     methods = run.order(set(rows["method"]) - run.twins)
     lines: list[tuple[Cell, ...]] = []
-    for name, scenes in ((OTHERS, norms.index[norms > 0.0]), (MEAN_BODY, norms.index[norms == 0.0])):
-        part = rows[rows["scene"].isin(scenes)]
+    for name, bodies in ((OTHERS, norms > 0.0), (MEAN_BODY, norms == 0.0)):
+        if not bodies.any():
+            continue
+        part = rows[rows["scene"].isin(norms.index[bodies])]
         all_means = means(part, "method", "metric")
         for method in methods:
             excess = None if method in (run.reference, SKINNING) else excess_of(run, part, method)
@@ -142,8 +143,9 @@ def shapes(run: Run) -> list[Table]:
         Column("scene", "Body", text=True), METHOD, Column("typical", "Typical", "%", digits=2),
         *map(metric_column, metrics),
     )  # fmt: skip
+    mean_body = ", and the mean body" * bool((norms == 0.0).any())
     caption = (
-        "Body shapes: the others together, and the mean body, in one motion. Typical (geometric, with its "
-        "interval over bodies and seeds): relative excess; energies and penetration: means."
+        f"Body shapes: the others together{mean_body}, in one motion. Typical (geometric, with its interval "
+        "over bodies and seeds): relative excess; energies and penetration: means."
     )
     return table("shapes", columns, lines, caption)

@@ -165,13 +165,12 @@ class Table:
         rows = tuple(tuple(row[k] for k in places) for row in self.rows)
         return replace(self, columns=tuple(self.columns[k] for k in places), rows=rows)
 
-    def write_csv(self, folder: Path) -> Path:
-        """Write <folder>/<name>.csv whole or not at all; return its path.
+    def write_csv(self, folder: Path) -> None:
+        """Write <folder>/<name>.csv whole or not at all.
 
         A mean gets a column for its spread over seeds and, where there is any, one for its uncertainty
         and one for the roll-outs that it lacks; an effect gets columns for its kind and its interval.
         """
-        path = folder / f"{self.name}.csv"
         texts: dict[str, list[str]] = {}
         for column, cells in zip(self.columns, zip(*self.rows)):
             title = f"{column.name} [{column.unit}]" if column.unit else column.name
@@ -188,9 +187,8 @@ class Table:
             if any(isinstance(cell, Effect) for cell in cells):
                 parts = zip(*map(_parts_of_effect, cells))
                 texts |= {f"{column.name}_{part}": list(cell) for part, cell in zip(EFFECT_PARTS, parts)}
-        with replacing(path) as temporary:
+        with replacing(folder / f"{self.name}.csv") as temporary:
             pd.DataFrame(texts).to_csv(temporary, index=False, lineterminator="\n")
-        return path
 
 
 def metric_column(metric: Metric) -> Column:

@@ -22,7 +22,7 @@ from reports.statistics.means_and_spreads import pair, recording_of
 from reports.statistics.pareto import run_time, select_timed
 from reports.statistics.relative_excess import TOTAL, add_excess, excess_of, own_excess_of
 from reports.statistics.verdicts import effect_of
-from reports.tables.table import DASH, METHOD, Cell, Column, Table, column_texts, metric_column
+from reports.tables.table import DASH, METHOD, REMARKS, Cell, Column, Table, column_texts, metric_column
 
 NAME = "for_your_paper"
 METRICS = (
@@ -33,14 +33,20 @@ CITATION = "Neural garments versus a reference solver: a physics-validation benc
 
 
 def write_paper_table(folder: RunFolder, run: Run) -> Table:
-    """Write for_your_paper.csv, with the caption in each row, and .tex; return the table."""
+    """Write for_your_paper.csv, in each row what it marks and the caption, and .tex; return the table."""
     table = paper_table(run)
-    rows = tuple((*row, table.caption) for row in table.rows)
-    columns = (*table.columns, Column("caption", "Caption", text=True))
-    replace(table, columns=columns, rows=rows).write_csv(folder.path)
+    rows = tuple((*row, _name_lacking(table, row) or None, table.caption) for row in table.rows)
+    columns = (*table.columns, *(Column(name, name, text=True) for name in ("lacking", "caption")))
+    replace(table, columns=columns, rows=rows).drop_empty().write_csv(folder.path)
     with replacing(folder.path / f"{NAME}.tex") as temporary:
         temporary.write_text(latex_table(run, table), encoding="utf-8", newline="\n")
     return table
+
+
+def _name_lacking(table: Table, row: tuple[Cell, ...]) -> str:
+    """Return the columns in which a row's mean is over fewer scenes or seeds than it should be."""
+    cells = {column.name: cell for column, cell in zip(table.columns, row)}
+    return ", ".join(k for k, cell in cells.items() if isinstance(cell, Effect) and not cell.complete)
 
 
 def paper_table(run: Run) -> Table:
@@ -66,14 +72,17 @@ def paper_table(run: Run) -> Table:
         Column("own_excess", "Own excess", "%"), Column("relative_excess", "Relative excess", "%"),
         *(metric_column(metric) for metric, _ in sources),
     ]  # fmt: skip
-    whole = any(isinstance(cell, Effect) for line in lines for cell in line)
+    shown = [cell for line in lines for cell in line if isinstance(cell, Effect)]
+    whole = any(effect.interval for effect in shown)
+    remark = "" if all(effect.complete for effect in shown) else REMARKS["*"]
     caption = (
         f"{run.first_garment or 'All scenes'}: means over independent sources of motion and over seeds, of "
         f"excess geometric{'; below: 95 % intervals, of times the range' if whole else ''}. Excess: energy "
         "above a reference solver's as a share of skinning's, in each method's own energies and in common "
         "ones. "
-        f"Protocol {run.protocol or 'own'}; cite: {CITATION}, at {run.config.get('commit') or 'no commit'}."
-    )
+        f"Protocol {run.protocol or 'own'}; cite: {CITATION}, at {run.config.get('commit') or 'no commit'}. "
+        f"{remark}"
+    ).rstrip()
     rounded = tuple(replace(column, digits=2) for column in columns)
     return Table(NAME, rounded, tuple(lines), caption).drop_empty()
 
@@ -90,10 +99,12 @@ def _mean(rows: pd.DataFrame, method: str, metric: Metric) -> Effect | None:
 
 
 def _cell(effect: Effect) -> Effect | float:
-    """Return the number alone where its interval says nothing."""
+    """Return the number alone, with its mark if it has one, where its interval says nothing."""
     low, high = effect.interval or (0.0, 0.0)
     enough = effect.covers == RANGE or effect.motions >= LEAST_MOTIONS
-    return effect if enough and high - low > 1e-6 * abs(high) else effect.shown
+    if enough and high - low > 1e-6 * abs(high):
+        return effect
+    return effect.shown if effect.complete else replace(effect, error=None, limits=None, covers="")
 
 
 def latex_table(run: Run, table: Table) -> str:
@@ -103,8 +114,11 @@ def latex_table(run: Run, table: Table) -> str:
         _stack(*column.title.replace(", ", " ").split(), f"[{column.unit}]" * bool(column.unit))
         for column in table.columns
     ]
-    body = [[_stack(cell["text"].removeprefix("+"), cell["spread"].replace(" to ", DASH)) for cell in line]
-        for line in zip(*columns)]  # fmt: skip
+    body = [
+        [_stack(cell["text"].removeprefix("+") + "*" * ("*" in cell["mark"]),
+            cell["spread"].replace(" to ", DASH)) for cell in line]
+        for line in zip(*columns)
+    ]  # fmt: skip
     lines = [f"\\raggedright {' & '.join(line)} \\\\[4pt]" for line in (heads, *body)]
     sides = "".join("p{2.7cm}" if column.text else "r" for column in table.columns)
     return "\n".join([

@@ -149,13 +149,11 @@ def front_sentences(run: Run) -> str:
     lines = (
         f"**{verdict(run, rows)}**\n",
         f"- Good at: energy for its time. Supervised has {supervised} "
-        f"(against SNUG p {number(p_values[UNSEEN], 2)}, corrected), "
-        f"PBNS {pbns}; "
+        f"(against SNUG p {number(p_values[UNSEEN], 2)}, corrected), PBNS {pbns}; "
         f"{run.label(SOLVER)}, has {stopped} ({interval or DASH}) and takes "
         f"{number(times[SOLVER] / times[NETWORK], 1)} times as long as SNUG.",
         "- Bad at: dynamics and unfamiliar motion. Its hem's correlation with the simulation's "
-        f"is {number(likeness[NETWORK], 2)} "
-        f"(Supervised {number(likeness['supervised'], 2)}), "
+        f"is {number(likeness[NETWORK], 2)} (Supervised {number(likeness['supervised'], 2)}), "
         f"its amplitude {number(100.0 * swing[NETWORK], 1)} % of the simulation's; "
         f"worst energy excess: {number(peak, 2)} %, in {scene.partition('/')[2]}.",
     )

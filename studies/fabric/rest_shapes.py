@@ -135,10 +135,9 @@ def drape(
     """
     material = find_fabric(fabric)
     specimen = disc(material, rings, membrane_factor)
-    if poisson_ratio == "zero":
-        extras = [GaussianCurvature(specimen.cloth, -NU * material.rigidity)]
-        return at_rest(specimen, rate, extras)
-    return at_rest(specimen, rate)
+    zero = poisson_ratio == "zero"
+    extras = [GaussianCurvature(specimen.cloth, -NU * material.rigidity)] if zero else []
+    return at_rest(specimen, rate, extras)
 
 
 def at_rest(specimen: Disc, rate: int = RATE, extras: Sequence[Energy] = ()) -> float:

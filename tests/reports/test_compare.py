@@ -40,9 +40,7 @@ def a_run(draw: int = 0) -> list[Row]:
         slowest = 7.0 * 100.0 ** (draw % 2)  # of each second run one frame is slow
         rows.append(row("flag", method, "cost/frame_worst", slowest, suite="speed", unit="ms"))
     # Of a scene without skinning, whose total is next to nothing.
-    rows += [
-        row("fall", method, "energy/total", 5e-8, suite="speed") for method in ("simulation", "lbfgs-5")
-    ]
+    rows += [row("fall", m, "energy/total", 5e-8, suite="speed") for m in ("simulation", "lbfgs-5")]
     check = {"suite": "validation", "unit": "m", "expected": 0.28, "tolerance": 1e-3}
     return [*rows, row("sag", "simulation", "check", 0.28, **check)]
 
@@ -138,9 +136,7 @@ def test_of_thousands_of_answers_the_farthest_by_chance_is_no_change():
 def test_a_correlation_of_the_other_sign_is_worse():
     def signed(sign: float) -> list[Row]:
         values = {(s, seed): sign * (0.8 + 0.01 * seed) for s in SCENES for seed in SEEDS}
-        return [
-            row(s, "snug", "dynamics/correlation", v, seed=k, unit="1") for (s, k), v in values.items()
-        ]
+        return [row(s, metric="dynamics/correlation", value=v, seed=k) for (s, k), v in values.items()]
 
     one, other = signed(1.0), signed(-1.0)
     assert found(one, other) == [("worse", "tshirt", "snug", "dynamics/correlation")]
@@ -152,15 +148,14 @@ def test_a_network_of_one_seed_is_judged_by_the_interval_of_the_seeds_of_the_ear
     assert not fails(a_run(0), [*later, *(r for r in a_run(1) if r.seed)])
     assert found(a_run(0), later, shared=True) == []
     worse = found(a_run(0), [times(3.0, **STRAIN)(given) for given in later], shared=True)
-    assert worse and {(verdict, *rest) for verdict, _, *rest in worse} == {
-        ("worse", "snug", "energy/strain")
-    }
+    assert {(verdict, *rest) for verdict, _, *rest in worse} == {("worse", "snug", "energy/strain")}
 
 
 def test_a_check_off_by_more_than_its_tolerance_is_worse_whatever_it_says():
     for more in ({}, {"tolerance": 5e-3}):
         later = [replace(r, value=0.284, **more) if r.scene == "sag" else r for r in a_run()]
         assert found(a_run(), later) == [("worse", "sag", "simulation", "check")]
+        assert found(later, later) == []  # an engine that violates a law is a result
 
 
 @pytest.mark.parametrize(("spread", "factors"), [(3.0, (1.2, 1.3)), (12.0, (1.22, 1.6))])
@@ -218,6 +213,7 @@ def test_where_zero_is_a_choice_no_change_hangs_on_it():
         (0.0, {}),
         (50.0, {"methods": "lbfgs-*"}),
         (50.0, {"metrics": "energy/gravity"}),
+        (50.0, {"metrics": "relative_excess/gravity"}),
     ):
         assert found(heights(0.0, zero), heights(0.03, zero), **options) == moved
     assert found(heights(0.0, 50.0), heights(0.015, 50.0)) == []  # 1.5 % of skinning's excess
@@ -235,6 +231,36 @@ def test_a_cell_that_fails_and_a_check_that_is_off_are_worse():
     assert found(a_run(), later) == found(a_run(), later, metrics="penetration/*") == both
     assert [verdict for verdict, *_ in found(later, a_run())] == ["better", "better"]
     assert found(a_run(), later, methods="lbfgs-*") == []
+    # A cell without numbers has one row, of a time.
+    sound = [r for r in a_run() if (r.scene, r.method, r.seed) != (SCENES[0], "snug", 1)]
+    lone = row(SCENES[0], "snug", "cost/frame", None, seed=1, status="failed", reason="no end")
+    assert [verdict for verdict, *_ in found([*sound, lone], a_run())] == ["better"]
+
+
+@pytest.mark.parametrize("fallen", [SCENES[:1], SCENES])
+@pytest.mark.parametrize("seeds", [SEEDS, SEEDS[:1]])
+def test_a_garment_that_fell_off_in_one_run_alone_is_worse_there(fallen, seeds):
+    def totals(seeds, fallen=()):
+        cells = [("simulation", 0, 1.0), ("skinning", 0, 2.0), *(("snug", seed, 1.1) for seed in seeds)]
+        rows = [row(s, name, "energy/total", x, seed=k) for s in SCENES for name, k, x in cells]
+        return [replace(r, value=-9.0) if r.method == "snug" and r.scene in fallen else r for r in rows]
+
+    before, after = totals(SEEDS), totals(seeds, fallen)
+    cells = [(scene, "snug", "relative_excess/total") for scene in fallen for _ in seeds]
+    assert found(before, after, shared=True) == [("worse", *cell) for cell in cells]
+    assert found(after, totals(seeds)) == [("better", *cell) for cell in cells]
+    assert " worse" in compare(run_of(before), run_of(after), shared=True).headline["snug"][0]
+
+
+@pytest.mark.parametrize(
+    ("seeds", "note", "compared"),
+    [(((0,), (0, 1)), "one seed", 1), (((0, 1), (1, 2)), "other seeds", 1), (((0, 1),) * 2, "same", 2)],
+)
+def test_a_network_that_nothing_judges_is_not_called_the_same(seeds, note, compared):
+    cells = ([("simulation", 0), *(("snug", k) for k in of_run)] for of_run in seeds)
+    one, other = ([row(s, m, "penetration/surface", seed=k) for s in SCENES for m, k in c] for c in cells)
+    comparison = compare(run_of(one), run_of(other), shared=True)
+    assert comparison.headline["snug"][2].endswith(f" {note}") and comparison.compared == compared
 
 
 def test_exit_status_and_lines(tmp_path, capsys):

@@ -26,10 +26,8 @@ def write_run(path, totals, scenes, protocol, **config):
         row(scene, name, metric, value, protocol=protocol, reason=reasons.get(metric, ""))
         for scene in scenes
         for name, total in (TOTAL | totals).items()
-        for metric, value in {
-            "energy/total": total[scene] if isinstance(total, dict) else total,
-            **numbers,
-        }.items()
+        for total in [total[scene] if isinstance(total, dict) else total]
+        for metric, value in {"energy/total": total, **numbers}.items()
     ]
     path.mkdir(parents=True)
     return read_run(run_folder(path, rows, **config))
@@ -57,22 +55,21 @@ def test_a_table_has_one_protocol_and_one_set_of_scenes_and_is_sorted(tmp_path, 
         write_entry(tmp_path / "in", "better", 1.08),
         write_entry(tmp_path / "in", "part", 1.0, scenes=FULL[:1]),
         write_entry(tmp_path / "in", "old", 1.0, protocol="0.9"),
+        write_entry(tmp_path / "in", "fallen", {"tshirt/a": 1.0, "tshirt/b": -20.0}),
     ]
     assert full_scenes(published) == FULL
     tables = [table for table, _ in entries_tables([*map(load_entry, made)], "quick", published)]
     assert {table.caption: [line[1].split()[0] for line in table.rows] for table in tables} == {
         "Protocol 0.9; scenes: all.": ["old"],
-        "Protocol 1.0; scenes: all.": ["better", "SNUG", "worse", "Skinning"],
+        "Protocol 1.0; scenes: all.": ["better", "SNUG", "worse", "Skinning", "fallen"],
         "Protocol 1.0; scenes: 1 of 2: tshirt/a.": ["part", "SNUG", "Skinning"],
     }
     lines = {line[1].split()[0]: line for table in tables for line in table.rows}
     assert lines["better"][2].shown == pytest.approx(1.0) and lines["worse"][2].interval is None
     assert (lines["better"][6], lines["SNUG"][6]) == ("declared", "measured")
     assert (lines["better"][0], lines["worse"][0]) == (1, 3)
-    assert {line[8] for name, line in lines.items() if name != "SNUG"} == {
-        "declared",
-        "verified from vertices",
-    }
+    proofs = {line[8] for name, line in lines.items() if name != "SNUG"}
+    assert proofs == {"declared", "verified from vertices"}
     page = page_of(tmp_path / "in", "quick", published)
     assert "<script>window" not in page
     content = json.loads(re.search(r'id="content">(.*?)</script>', page, re.DOTALL)[1])
@@ -87,11 +84,8 @@ def test_a_roll_out_that_fell_off_is_seen_in_an_entry_of_few_motions(tmp_path):
 def test_scores_of_files_as_they_were_scored_are_marked_by_who_made_them(tmp_path):
     folder, scores = write_entry(tmp_path, "mine", 2.0), RunFolder(tmp_path / "mine" / "scores")
     (folder / "x.npz").write_text("frames")
-    config = scores.read_config() | {
-        "entry": {"x.npz": digest_of_file(folder / "x.npz")},
-        "commit": "abc",
-    }
-    config |= {"date": "2026-11-29", "roll_outs": {"a-seed0": "12"}}
+    files = {"entry": {"x.npz": digest_of_file(folder / "x.npz")}, "roll_outs": {"a-seed0": "12"}}
+    config = scores.read_config() | files | {"commit": "abc", "date": "2026-11-29"}
     for program, proof in (("", "files only"), ("method.py", "verified from vertices")):
         url = {"url": "https://example.org/mine"}
         scores.write_config(config | {"metadata": config["metadata"] | url | {"program": program}})

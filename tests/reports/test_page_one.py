@@ -61,9 +61,8 @@ def test_a_network_whose_garment_fell_off_is_named():
 def test_page_one_shows_the_network_the_papers_rival_or_another_and_a_baseline():
     run = run_of(all_rows())
     assert leads(run, run.garment_rows) == ["simulation", "snug", "pbns", "skinning"]
-    mine = [
-        dataclasses.replace(r, role="external", seeded=False) for r in on_two_scenes("mine", 3.0, 9.0)
-    ]
+    mine, own = on_two_scenes("mine", 3.0, 9.0), {"role": "external", "seeded": False}
+    mine = [dataclasses.replace(r, **own) for r in mine]
     alone = run_of([*BESIDE, *mine])
     assert leads(alone, alone.garment_rows) == ["simulation", "mine", "skinning"]
     times = [
@@ -73,6 +72,5 @@ def test_page_one_shows_the_network_the_papers_rival_or_another_and_a_baseline()
     # Of 25 and 20 % of skinning's excess it keeps 22 % as geometric mean, in 1/24.75 of the time.
     text = said("Verdict", [*BESIDE, *SNUG, *mine, *times])
     assert text.startswith("In a typical unseen motion mine has 22 % of skinning's excess")
-    assert text.endswith(
-        "(22 % summed over all motions), and is more than 20 times faster than the simulation."
-    )
+    end = "(22 % summed over all motions), and is more than 20 times faster than the simulation."
+    assert text.endswith(end)

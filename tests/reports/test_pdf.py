@@ -53,9 +53,8 @@ def report(tmp_path_factory):
     """The pages of a report with roll-outs."""
     rows, provenance = hostile_rows(), {"commit": "abc", "started": "2030-01-02T03:04:05+00:00"}
     run = run_folder(tmp_path_factory.mktemp("run"), rows, preset="smoke", **provenance)
-    write_roll_outs(
-        run, {r.scene for r in rows if r.garment}, {r.method for r in rows} & {*SHOWN, *HOSTILE}
-    )
+    methods = {r.method for r in rows} & {*SHOWN, *HOSTILE}
+    write_roll_outs(run, {r.scene for r in rows if r.garment}, methods)
     read = read_run(run)
     pictures = draw_figures(read, run.figures, FIGURES)
     write_pdf(run, Report(read, make_tables(read), pictures))
@@ -81,9 +80,8 @@ def words(page) -> list[tuple[str, np.ndarray]]:
         apart = boxes and box is not None and (box[0] - boxes[-1][2] > 1.5 or box[0] < boxes[-1][0] - 1.0)
         if (box is None or apart) and boxes:
             edges = np.array(boxes)
-            word_boxes.append(
-                (letters, np.concatenate([edges[:, :2].min(axis=0), edges[:, 2:].max(axis=0)]))
-            )
+            whole = np.concatenate([edges[:, :2].min(axis=0), edges[:, 2:].max(axis=0)])
+            word_boxes.append((letters, whole))
             letters, boxes = "", []
         if box is not None:
             letters, boxes = letters + letter, [*boxes, box]
@@ -115,9 +113,9 @@ def test_pages_are_few_and_full(report):
 
 
 def test_names_stand_as_they_are(texts):
-    bare = "".join(word for page in texts for word, _ in page).replace(
-        "\u200b", ""
-    )  # where a line may break
+    bare = "".join(word for page in texts for word, _ in page)
+    bare = bare.replace("\u200b", "")  # where a line may break
     assert "裙" not in bare  # of no font: it would be an empty box
     names = ["Simulation", *HOSTILE[:2], LONG, "U+88D9U+5B50/U+590FU+5929-βήτα"]
     assert [name for name in names if "".join(name.split()) not in bare] == []
+    assert "overthesegmentsofarecording" in bare  # what means are over

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import gzip
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,8 +11,10 @@ import numpy as np
 import pytest
 
 from benchmarks.provenance import digest_of_file
+from benchmarks.results.row import ResultsError
 from benchmarks.results.run_folder import RunFolder
 from reports import build
+from reports.figures.charts import energy_series
 from reports.finished_run import read_run
 from tests.reports.report_folder import (
     FRAMES,
@@ -37,12 +40,9 @@ def made(tmp_path_factory) -> RunFolder:
     metadata = {"preset": "smoke", "commit": "abc", "finished": "2030-01-02T03:04:05+00:00"}
     run = run_folder(tmp_path_factory.mktemp("run"), all_rows(), **metadata)
     write_roll_outs(run, SCENES, SHOWN)
-    energies = [
-        f"{scene},{m},0,{k / 30},{0.1 * k},0.1" for scene in SCENES for m in SHOWN for k in range(3)
-    ]
-    run.frame_energies_path.write_text(
-        "\n".join(["scene,method,seed,seconds,strain,bending", *energies, ""])
-    )
+    lines = [f"{s},{m},0,{k / 30},{0.1 * k},0.1" for s in SCENES for m in SHOWN for k in range(3)]
+    head = "scene,method,seed,seconds,strain,bending"
+    run.frame_energies_path.write_text("\n".join([head, *lines, ""]))
     run.figures.mkdir()
     for name in (*OLD, *KEPT):
         (run.figures / name).write_bytes(b"")
@@ -121,6 +121,17 @@ def test_curves_beside_a_trajectory_are_its_own(tmp_path):
     run.curves_path(SCENES[0], "snug").write_bytes(b"no archive")
     read = read_run(run)
     assert read.roll_outs.cloth(SCENES[0], "snug", 0) is None and "snug.npz" in read.problems[0]
+
+
+def test_a_broken_copy_of_frame_energies_is_refused_and_scenes_without_rows_are_left_out(tmp_path):
+    run, path = run_folder(tmp_path, [row("tshirt/jump")]), tmp_path / "frame_energies.csv.gz"
+    lines = [f"{scene},snug,0,{k},{k + 1}" for scene in SCENES for k in range(99)]
+    whole = gzip.compress("\n".join(["scene,method,seed,seconds,strain", *lines]).encode())
+    path.write_bytes(whole)
+    assert energy_series(read_run(run)).name == "energy_series_tshirt-jump"
+    path.write_bytes(whole[:-40])
+    with pytest.raises(ResultsError, match=r"csv\.gz: not readable"):
+        read_run(run)
 
 
 def test_page_one_names_the_files_that_are_not_as_the_run_wrote_them(tmp_path):

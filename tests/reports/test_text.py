@@ -12,16 +12,17 @@ from benchmarks.declarations import attributes_of
 from benchmarks.external.roll_out_files import KEYS
 from benchmarks.results.row import COLUMNS, Row
 from benchmarks.results.run_folder import RunFolder
+from reports.build import build_row
 from reports.docs import documents, main
 from reports.statistics.effects import EXCESS, Effect
 from reports.statistics.means_and_spreads import Mean
-from reports.tables.table import METHOD, Column, Table
+from reports.tables.table import METHOD, REMARKS, Column, Table
 from reports.text.for_your_paper import latex, write_paper_table
 from reports.text.published_parts import BEGIN, END, docstring_rows, fill, published_part
 from reports.text.text_table import text_rows
 from snug.body.smpl_files import SYNONYMS
 from snug.motion.files import ARRAY_NAMES
-from tests.reports.report_folder import row, run_of
+from tests.reports.report_folder import row, run_folder, run_of
 
 RUN = run_of([row("a/b", "snug", "energy/total")])
 
@@ -116,10 +117,21 @@ def test_the_table_for_a_paper_has_intervals_counts_protocol_and_columns_of_the_
     assert snug["cost/frame [ms]"] == 0.25 and not {"distance/rms [mm]", "own_excess [%]"} & set(lines)
     assert "Protocol 2.0; cite: Neural garments" in snug["caption"] and "abc123" in snug["caption"]
     assert "intervals" in snug["caption"]
-    write_paper_table(
-        RunFolder(tmp_path), run_of([r for r in rows_for_a_paper() if r.scene == "tshirt/m0"])
-    )
+    one_motion = [r for r in rows_for_a_paper() if r.scene == "tshirt/m0"]
+    write_paper_table(RunFolder(tmp_path), run_of(one_motion))
     assert "intervals" not in (tmp_path / "for_your_paper.csv").read_text(encoding="utf-8")
+
+
+def test_a_mean_that_lacks_roll_outs_has_a_mark_and_the_mark_its_meaning(tmp_path):
+    last = {"simulation": 1.0, "skinning": 11.0, "snug": -99.0}  # it fell off
+    rows = [*rows_for_a_paper(), *(row("tshirt/m5", m, "energy/total", x) for m, x in last.items())]
+    rows.append(row("tshirt/m1", "skinning", "penetration/surface", 4.0, unit="%"))
+    text = build_row(run_folder(tmp_path, rows).path)
+    assert "| 4.0* |" in text and re.search(r"\| 1\d\* \|", text) and text.endswith(REMARKS["*"])
+    tex = (tmp_path / "for_your_paper.tex").read_text(encoding="utf-8")
+    assert "& 4.0* &" in tex and REMARKS["*"] in tex
+    lacking = pd.read_csv(tmp_path / "for_your_paper.csv")["lacking"]
+    assert list(lacking) == ["-", "penetration/surface", "relative_excess"]
 
 
 def test_the_latex_of_the_table_for_a_paper_is_sound_whatever_names_hold(tmp_path):

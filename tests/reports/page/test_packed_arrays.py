@@ -19,9 +19,8 @@ def unpacked(entries: dict, text: str) -> dict[str, np.ndarray]:
         shape = tuple(entry["shape"])
         size = int(np.prod(shape))
         if entry["kind"] == "positions":
-            low, high = (
-                np.frombuffer(data, np.uint8, 2 * size, entry["at"]).reshape(2, *shape).astype(int)
-            )
+            planes = np.frombuffer(data, np.uint8, 2 * size, entry["at"])
+            low, high = planes.reshape(2, *shape).astype(int)
             left = low + 256 * high
             left = np.where(left % 2, -(left + 1) // 2, left // 2)
             steps = np.zeros((shape[0] + 2, *shape[1:]), dtype=int)

@@ -42,10 +42,8 @@ def rows_of_page():
             rows.append(row(scene, method, "energy/total", 2.0 + number, **part))
             if method != "simulation":
                 rows.append(row(scene, method, "curvature/error", 9.0 / number, unit="1/m", **part))
-    for method, status, reason in (
-        (NASTY, "failed", f"diverged {NASTY}"),
-        ("supervised", "timeout", "over 30 s"),
-    ):
+    failures = ((NASTY, "failed", f"diverged {NASTY}"), ("supervised", "timeout", "over 30 s"))
+    for method, status, reason in failures:
         rows.append(row(WHOLE, method, "energy/total", None, status=status, reason=reason))
     return [*rows, skipped(scene="hanging_sheet", suite="speed")]
 
@@ -153,10 +151,8 @@ def test_whole_motions_of_the_methods_of_page_one_come_before_all_others(folder)
 def test_tables_stand_under_the_headings_of_the_report(page):
     tables = content_of(page)["tables"]
     groups_of_tables = [group for group, _ in itertools.groupby(table["group"] for table in tables)]
-    assert (
-        groups_of_tables[:3] == ["Answer", "The paper's tables", "Findings"]
-        and len(groups_of_tables) == 4
-    )
+    assert groups_of_tables[:3] == ["Answer", "The paper's tables", "Findings"]
+    assert len(groups_of_tables) == 4
     assert [table["title"] for table in tables][:2] == ["Overview", "Energies"]
 
 
@@ -179,10 +175,8 @@ def test_the_page_is_well_formed_and_asks_for_nothing(page):
     linked = [value for _, name, value in markup.attributes if name in ("src", "href", "action", "data")]
     assert linked == ["data:,", "report.pdf", "results.csv", "tables/"]
     assert not re.search(r"\b(fetch|XMLHttpRequest|WebSocket|importScripts|import)\b\s*\(", page)
-    addresses = set(
-        re.findall(r"(?:https?:)?//[\w.]+\.\w+[^'\" ]*", re.sub(r">[\w+/=]{99,}<", "><", page))
-    )
-    assert addresses == {"http://www.w3.org/2000/svg"}
+    bare = re.sub(r">[\w+/=]{99,}<", "><", page)
+    assert {*re.findall(r"(?:https?:)?//[\w.]+\.\w+[^'\" ]*", bare)} == {"http://www.w3.org/2000/svg"}
 
 
 def test_a_browser_may_run_the_own_script_alone(page):
@@ -245,10 +239,8 @@ def test_a_person_can_use_it(page, tmp_path):
     assert (state["playing"], state["paused"]) == ("Pause", "Play") and state["played"]
     assert state["clock"] == "0.07 s · 3 of 5"
     assert state["added"] == "newton-4" and state["withAdded"][-1] == "Newton, 4 iterations"
-    assert (
-        state["pointed"] == "pbns" and "pbns" in state["withPointed"] and len(state["withPointed"]) == 4
-    )
-    assert state["focused"] == "pbns"
+    assert state["pointed"] == state["focused"] == "pbns"
+    assert "pbns" in state["withPointed"] and len(state["withPointed"]) == 4
     assert state["turned"] and state["scale"] == "Mean curvature [1/m]"
     assert state["colours"] == ["plain", "curvature", "step", "distance", "depth"]
     assert state["unjudged"] == ["step not judged"] * 4 and state["judged"] == [""] * 4

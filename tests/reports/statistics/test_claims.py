@@ -121,8 +121,7 @@ def test_the_primary_family_is_the_same_whatever_a_run_has_and_others_are_not_co
 
 
 @pytest.mark.parametrize(
-    ("supervised", "verdict"),
-    [(30_000.0, "holds"), (300.0, "does not hold"), (10_100.0, "tie")],
+    ("supervised", "verdict"), [(30_000.0, "holds"), (300.0, "does not hold"), (10_100.0, "tie")]
 )
 def test_two_orders_of_magnitude_are_judged_with_their_factor(supervised, verdict):
     """SNUG: 101 s with its setup; the other: `supervised` of training and data, and a second of setup."""

@@ -86,9 +86,8 @@ def test_seeds_of_a_pairing_group_are_drawn_at_once_and_others_by_themselves():
     later = [row(method="snug-no-inertia", value=v, seed=k) for k, v in enumerate(LESS, 1)]
     later = mean_of(run_of(later).frame, "snug-no-inertia", "energy/strain")
     for other in (mean_over(LESS, "pbns"), mean_over([*LESS, 1.1], "snug-no-inertia"), later):
-        assert (
-            effect(other, mean_over(ONE)).p_value() > 0.5
-        )  # other networks and seeds draw other numbers
+        # Other networks and seeds draw other numbers.
+        assert effect(other, mean_over(ONE)).p_value() > 0.5
     rows = [row(method="snug-no-inertia", value=LESS[k], seed=k) for k in (2, 0, 1)]
     turned = mean_of(run_of(rows).frame, "snug-no-inertia", "energy/strain")
     assert effect(turned, mean_over(ONE)) == alike  # by their number, not their order
@@ -129,17 +128,13 @@ def test_of_four_motions_and_three_seeds_95_percent_of_the_intervals_hold_the_tr
     assert covered(paired, spread) < 0.9
 
 
-SEGMENTS = [f"tshirt/01_01_{letter}" for letter in "abcdefg"] + [
-    f"tshirt/02_07_{letter}" for letter in "abcdef"
-]
+SEGMENTS = [*(f"tshirt/01_01_{x}" for x in "abcdefg"), *(f"tshirt/02_07_{x}" for x in "abcdef")]
 MOTIONS = [*SEGMENTS, *(f"tshirt/{k:02d}_03" for k in range(3, 8)), "tshirt/kick", "tshirt/punch"]
 
 
 def test_a_mean_is_over_sources_of_motion_of_which_the_segments_of_a_recording_are_one():
     values = {"01_01_a": 1.0, "01_01_b": 3.0, "kick": 10.0}
-    rows = [
-        row(f"tshirt/{motion}", "snug", "energy/strain", x, uncertainty=x) for motion, x in values.items()
-    ]
+    rows = [row(f"tshirt/{motion}", value=x, uncertainty=x) for motion, x in values.items()]
     mean = mean_of(run_of(rows).frame, "snug", "energy/strain")
     assert (mean.value, mean.uncertainty, len(mean.cells)) == (6.0, 6.0, 3)
 
@@ -148,9 +143,8 @@ def test_a_mean_is_over_sources_of_motion_of_which_the_segments_of_a_recording_a
 def test_segments_of_a_recording_are_no_independent_motions(alike, monkeypatch):
     recordings = [means_and_spreads.recording_of(scene) for scene in MOTIONS]
     _, place = np.unique(recordings, return_inverse=True)
-    assert (
-        place.max() == 8 and means_and_spreads.recording_of("tshirt/01_01_a@clip") == "tshirt/01_01@clip"
-    )
+    assert place.max() == 8
+    assert means_and_spreads.recording_of("tshirt/01_01_a@clip") == "tshirt/01_01@clip"
     random = np.random.default_rng(5)
 
     def interval():
@@ -166,9 +160,8 @@ def test_segments_of_a_recording_are_no_independent_motions(alike, monkeypatch):
     assert 0.93 <= held() <= 0.98
     same = {(scene, 0): 99.7 for scene in MOTIONS}
     constant = Mean(99.7, None, 1, 20, seeded=False, cells=same)
-    assert (
-        effect(constant, replace(constant, cells=dict.fromkeys(same, 0.1)), DIFFERENCE).interval is None
-    )
+    other = replace(constant, cells=dict.fromkeys(same, 0.1))
+    assert effect(constant, other, DIFFERENCE).interval is None
     if alike:
         monkeypatch.setattr(means_and_spreads, "recording_of", lambda scene: scene)
         assert held() < 0.85
@@ -266,9 +259,8 @@ def test_two_starts_make_the_noise_and_smaller_steps_a_trend_that_may_turn_the_s
     both = effect(*moved_means({"snug": snug, "pbns": snug}), DIFFERENCE)
     assert both.uncertainty == pytest.approx(0.0) and both.find_reversals() == []
     logs = [np.log(1.0 + np.array(moves)).mean() for moves in zip(*snug)]
-    assert effect(*moved_means({"snug": snug, "pbns": none})).uncertainty == pytest.approx(
-        math.sqrt((logs[0] ** 2 + (logs[1] - logs[2]) ** 2) / 4.0)
-    )
+    noise = math.sqrt((logs[0] ** 2 + (logs[1] - logs[2]) ** 2) / 4.0)
+    assert effect(*moved_means({"snug": snug, "pbns": none})).uncertainty == pytest.approx(noise)
     # A member that is missing in one motion did not leave that motion as it was: it takes no part.
     one, other = moved_means({"snug": snug, "pbns": none})
     first, *_ = one.moved
@@ -276,9 +268,8 @@ def test_two_starts_make_the_noise_and_smaller_steps_a_trend_that_may_turn_the_s
     assert effect(third, other, DIFFERENCE).against == comparison.against
     # One that stalled in one motion of three moves the value as in the other two.
     most = effect(*moved_means({"snug": (*snug, (9.0,)), "pbns": (*none, (0.0,))}), DIFFERENCE)
-    assert (
-        most.against == pytest.approx(comparison.against) and most.uncertainty == comparison.uncertainty
-    )
+    assert most.against == pytest.approx(comparison.against)
+    assert most.uncertainty == comparison.uncertainty
     # Smaller steps alone have no noise.
     trend = effect(*moved_means({"snug": ((0.0,), (0.0,)), "pbns": ((), ())}), DIFFERENCE)
     assert trend.uncertainty == 0.0

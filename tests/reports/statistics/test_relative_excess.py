@@ -18,8 +18,8 @@ def shares(*rows):
     return made[made["metric"] == RELATIVE_EXCESS.name].set_index("method")
 
 
-def of(method, value, **more):
-    return row("tshirt/kick", method, "energy/total", value, **more)
+def of(method, value, metric="energy/total", **more):
+    return row("tshirt/kick", method, metric, value, **more)
 
 
 def test_a_method_that_is_declared_a_baseline_is_not_skinning():
@@ -27,20 +27,15 @@ def test_a_method_that_is_declared_a_baseline_is_not_skinning():
     given = of("simulation", 1.0), of("untrained", 5.0), of("snug", 1.5)
     assert shares(*given).empty
     made = shares(*given, of("skinning", 2.0))
-    assert made.loc[["simulation", "skinning", "snug", "untrained"], "value"].tolist() == pytest.approx(
-        [0.0, 100.0, 50.0, 400.0]
-    )
+    values = {"simulation": 0.0, "skinning": 100.0, "snug": 50.0, "untrained": 400.0}
+    assert made["value"].to_dict() == pytest.approx(values)
 
 
 @pytest.mark.parametrize("status, members", [("ok", [ENSEMBLE]), ("stalled", [])])
 def test_a_member_of_the_ensemble_that_stalled_takes_no_part(status, members):
     reason = "?" * (status != "ok")
-    made = shares(
-        of("simulation", 1.0),
-        of(ENSEMBLE, 1.2, status=status, reason=reason),
-        of("skinning", 2.0),
-        of("snug", 1.5),
-    )
+    member = of(ENSEMBLE, 1.2, status=status, reason=reason)
+    made = shares(of("simulation", 1.0), member, of("skinning", 2.0), of("snug", 1.5))
     assert [name for name, _ in made.loc["snug", "moved"]] == members
 
 
@@ -62,9 +57,7 @@ def test_means_are_over_sources_recorded_ones_apart_and_the_pooled_share_over_mo
 
 def test_a_method_with_less_energy_than_a_finer_simulation_is_below_zero_against_it():
     energies = {"simulation": 1.0, "simulation-dt/4": 1.4, "skinning": 2.4, "snug": 1.2, "pbns": 1.6}
-    rows = [
-        row(f"tshirt/{clip}", name, "energy/total", x) for name, x in energies.items() for clip in "ab"
-    ]
+    rows = [row(f"tshirt/{c}", name, "energy/total", x) for name, x in energies.items() for c in "ab"]
     _, made = relative_excess(run_of(rows))
     assert [column.name for column in made.columns[2:]] == ["simulation", "simulation-dt/4"]
     shown = {method: numbers for _, method, *numbers in made.rows}
@@ -83,16 +76,21 @@ def test_a_garment_that_fell_off_has_no_excess():
     assert [row[1] for row in table.rows] == ["pbns"]
 
 
+@pytest.mark.parametrize(
+    ("gravity", "total", "worn"), [(-12.0, 1.4, True), (1.4, -1.0, False), (-12.0, None, False)]
+)
+def test_the_total_says_what_fell_off_and_gravity_where_there_is_none(gravity, total, worn):
+    values = {"simulation": (1.0, 1.0), "skinning": (2.0, 2.0), "snug": (gravity, total)}
+    rows = [of(m, x, metric=f"energy/{term}") for m, both in values.items()
+        for term, x in zip(("gravity", "total"), both) if x is not None]  # fmt: skip
+    run = run_of(rows)
+    made = add_excess(run, run.frame, "energy/gravity").query("metric == 'relative_excess/gravity'")
+    assert made.set_index("method")["usable"]["snug"] == worn
+
+
 def test_a_seed_that_fell_off_is_not_in_the_pooled_share():
-    others = [
-        row(f"tshirt/{c}", m, "energy/total", x)
-        for c in "ab"
-        for m, x in (("simulation", 1.0), ("skinning", 2.0))
-    ]
-    worn = [row(f"tshirt/{clip}", "snug", "energy/total", 1.5) for clip in "ab"]
-    fallen = row("tshirt/a", "snug", "energy/total", -2.0, seed=1)
-    (table,) = relative_excess(run_of([*others, *worn, fallen]))
-    assert table.rows[0][1] == "snug"
-    assert dict(zip((column.name for column in table.columns), table.rows[0]))["pooled"] == pytest.approx(
-        50.0
-    )
+    totals = {"simulation": 1.0, "skinning": 2.0, "snug": 1.5}
+    rows = [row(f"tshirt/{clip}", m, "energy/total", x) for clip in "ab" for m, x in totals.items()]
+    (table,) = relative_excess(run_of([*rows, row("tshirt/a", "snug", "energy/total", -2.0, seed=1)]))
+    shown = dict(zip((column.name for column in table.columns), table.rows[0]))
+    assert (shown["method"], shown["pooled"]) == ("snug", pytest.approx(50.0))

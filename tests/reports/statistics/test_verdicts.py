@@ -65,12 +65,11 @@ def test_one_reading_of_a_clock_gives_no_verdict_and_one_of_a_size_does():
         for metric in ("cost/frame", "cost/memory")
     ]
     run = run_of(rows)
-    time, size = (
-        compare_methods(
-            run, run.frame, Metric(name=name, unit="1", title=name, definition="", of=of), "snug", "pbns"
-        ).effect
+    metrics = (
+        Metric(name=name, unit="1", title=name, definition="", of=of)
         for name, of in (("cost/frame", "machine"), ("cost/memory", "method"))
     )
+    time, size = (compare_methods(run, run.frame, m, "snug", "pbns").effect for m in metrics)
     assert (decide(time, None), explain(time)) == (OPEN, ": no range")
     assert (decide(size, None), explain(size)) == (LESS, "")
 

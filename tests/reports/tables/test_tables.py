@@ -13,6 +13,7 @@ from reports.pdf import lay_out_table
 from reports.statistics.means_and_spreads import Mean, mean_of, pair
 from reports.tables import make_tables
 from reports.tables.paper_tables import CURVATURE, paper_tables
+from reports.tables.pivots import shapes
 from tests.reports.report_folder import SCENES, row, run_of
 
 
@@ -48,10 +49,9 @@ def test_a_failed_cell_enters_no_mean_and_the_table_says_so():
     run = run_of(rows)
     table = make_tables(run)["energies"]
     lines = {line[1]: line[2] for line in table.rows}
-    assert lines["snug"].value == 1.0 and not lines["snug"].complete
-    assert (
-        lines["simulation"].value == 5.0 and lines["simulation"].complete and lines["simulation"].stalled
-    )
+    snug, reference = lines["snug"], lines["simulation"]
+    assert snug.value == 1.0 and not snug.complete
+    assert reference.value == 5.0 and reference.complete and reference.stalled
     block = lay_out_table(run, table)
     assert [line[1]["mark"] for line in block["groups"][0]["rows"]] == ["†", "*"]
     assert "fewer scenes" in block["note"] and "unconverged" in block["note"]
@@ -83,6 +83,17 @@ def test_pairs_share_their_scenes_or_have_their_own():
     assert pair(run_of(rows[:2]).frame, "snug", "pbns", "energy/total")[0].value == 5.0
 
 
+@pytest.mark.parametrize(
+    ("norm", "bodies"), [(1.0, ["other shapes"]), (0.0, ["other shapes", "mean shape"])]
+)
+def test_the_mean_body_has_lines_and_words_where_there_is_one(norm, bodies):
+    rows = [row(scene, metric="energy/strain", suite="shapes") for scene in SCENES]
+    rows += [row(s, metric="body/shape", value=x, suite="shapes") for s, x in zip(SCENES, (norm, 2.0))]
+    (made,) = shapes(run_of(rows))
+    assert [line[0] for line in made.rows] == bodies
+    assert ("mean body" in made.caption) == ("mean shape" in bodies)
+
+
 # frames and energy of each motion
 MOTIONS = {"01_01_a": (3, 1.0), "07_02": (1, 5.0), "kick": (4, 10.0), "turn": (9, 99.0)}
 FACTORS = {"snug-paper": 1.0, "snug-paper-no-strain": 7.0, "pbns-paper": 2.0, "simulation-dt/4": 0.1}
@@ -107,6 +118,9 @@ def test_each_frame_weighs_the_same_on_the_papers_clips_and_on_all_motions():
     assert two[0] == (clips, "full loss", 2.0, 1.0, 2.0, 2.0, 2.7, 1.0)
     assert two[1] == (clips, "without strain", 14.0, 7.0, 14.0, 14.0, 19.1, 19.1 / 2.7)
     assert two[2][2:] == (pytest.approx(0.2), None, pytest.approx(0.2), pytest.approx(0.2), None, None)
+    alone = run_of([r for r in rows if r.method != "simulation-dt/4"])
+    captions = made[1].caption, paper_tables(replace(alone, frame_energies=frames))[1].caption
+    assert ["Below: the reference" in caption for caption in captions] == [True, False]
     full = [r for r in rows if r.method != "snug-paper-no-strain"]
     assert len(paper_tables(replace(run_of(full), frame_energies=frames))) == 1
     heading = next(place for place, block in enumerate(BLOCKS) if isinstance(block, Heading))
