@@ -89,9 +89,6 @@ def test_poses_that_are_none_are_refused(body, poses):
         body.vertices(poses, np.zeros((2, 3)))
 
 
-CHAIN = [-1, 0, 1, 1]
-
-
 def random_tensor(*shape: int, seed: int = 0) -> torch.Tensor:
     return torch.from_numpy(np.random.default_rng(seed).normal(size=shape))
 
@@ -100,25 +97,6 @@ def rotations_of(turns: torch.Tensor) -> torch.Tensor:
     """(..., 3) [rad] -> (..., 3, 3), by scipy."""
     matrices = Rotation.from_rotvec(turns.reshape(-1, 3).numpy()).as_matrix()
     return torch.from_numpy(matrices).reshape(*turns.shape, 3)
-
-
-def test_chain_against_homogeneous_matrices():
-    """The textbook product of 4x4 matrices, G_j = G_parent [R_j | p_j - p_parent], then G_j [I | -p_j]."""
-    rotations = rotations_of(random_tensor(4, 3))
-    joints, translation = random_tensor(4, 3, seed=1), random_tensor(3, seed=2)
-    world: list[np.ndarray] = []
-    for joint, parent in enumerate(CHAIN):
-        local = np.eye(4)
-        local[:3, :3] = rotations[joint].numpy()
-        local[:3, 3] = (
-            joints[joint] + translation if parent < 0 else joints[joint] - joints[parent]
-        ).numpy()
-        world.append(local if parent < 0 else world[parent] @ local)
-    transforms = joint_transforms(rotations, joints, CHAIN, translation)
-    for joint, matrix in enumerate(world):
-        unpose = np.eye(4)
-        unpose[:3, 3] = -joints[joint].numpy()
-        np.testing.assert_allclose(transforms[joint].numpy(), (matrix @ unpose)[:3], atol=1e-14)
 
 
 @pytest.mark.parametrize("windows", [2, 16])

@@ -22,18 +22,11 @@ KEPT = {"strain": 0.1575, "bending": 0.000503, "gravity": 0.1377, "inertia": 0.0
 TOLERANCE = 0.03  # processors round differently; the planted faults are farther off
 
 
-def trained(**changes: object) -> dict[str, float]:
-    recipe = replace(RECIPE, **changes)
-    trainer = Trainer(
-        "snug", tube_dress(), [swaying(36, degrees=40.0)], steps=STEPS, seed=0, recipe=recipe
-    )
+def trained() -> dict[str, float]:
+    motions = [swaying(36, degrees=40.0)]
+    trainer = Trainer("snug", tube_dress(), motions, steps=STEPS, seed=0, recipe=RECIPE)
     means = [trainer.step(number) for number in range(STEPS)][-LAST:]
     return {name: float(np.mean([mean[name] for mean in means])) for name in KEPT}
-
-
-def off(energies: dict[str, float]) -> set[str]:
-    """Return the terms that are not those kept."""
-    return {name for name, value in KEPT.items() if abs(energies[name] - value) > TOLERANCE * value}
 
 
 def test_a_small_training_reaches_the_energies_that_are_kept():
@@ -47,8 +40,4 @@ def test_inertia_at_a_third_is_noticed(monkeypatch):
         "batch_of_windows",
         lambda term, ahead, windows, weight: plain(term, ahead, windows, weight / 3),
     )
-    assert "inertia" in off(trained())
-
-
-def test_another_initialisation_is_noticed():
-    assert {"strain", "bending"} <= off(trained(initialisation="torch"))
+    assert trained()["inertia"] != pytest.approx(KEPT["inertia"], rel=TOLERANCE)
