@@ -95,9 +95,9 @@ class Cloth:
     def frames(self) -> np.ndarray:
         """(F, 2, 2) matrices Dm = [X1 - X0, X2 - X0] in a local orthonormal frame of the face [m]."""
         corner = self.rest_corners
-        if corner.shape[2] == 2:
-            return np.stack([corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]], axis=-1)
         first, second = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+        if corner.shape[2] == 2:
+            return np.stack([first, second], axis=-1)
         length = np.linalg.norm(first, axis=1)
         along = np.einsum("fi,fi->f", first, second) / np.maximum(length, 1e-300)
         across = np.linalg.norm(np.cross(first, second), axis=1) / np.maximum(length, 1e-300)
@@ -176,8 +176,7 @@ def edge_table(faces: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.nda
     """
     half = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     opposite = faces[:, [2, 0, 1]].ravel()
-    low, high = half.min(1), half.max(1)
-    key = low * vertex_count + high
+    key = half.min(1) * vertex_count + half.max(1)
     order = np.argsort(key, kind="stable")
     unique, start, count = np.unique(key[order], return_index=True, return_counts=True)
     edges = np.stack(np.divmod(unique, vertex_count), axis=1)
@@ -189,7 +188,7 @@ def edge_table(faces: np.ndarray, vertex_count: int) -> tuple[np.ndarray, np.nda
             "manifold, split it"
         )
     sides = np.full((len(unique), 2), -1, dtype=np.int64)
-    tips = np.full((len(unique), 2), -1, dtype=np.int64)
+    tips = sides.copy()
     forward = half[:, 0] < half[:, 1]
     for side in (0, 1):
         rows = np.flatnonzero(count > side)
@@ -251,14 +250,13 @@ def check_mesh(positions: np.ndarray, faces: np.ndarray) -> None:
     bad = np.flatnonzero(~np.isfinite(positions).all(axis=1))
     if bad.size:
         raise MeshError(f"vertex {bad[0]} is not finite: {positions[bad[0]].tolist()}")
-    bad = np.flatnonzero((faces < 0).any(axis=1) | (faces >= len(positions)).any(axis=1))
+    bad = np.flatnonzero(((faces < 0) | (faces >= len(positions))).any(axis=1))
     if bad.size:
         face = faces[bad[0]].tolist()
         raise MeshError(f"face {bad[0]} = {face} names a vertex outside 0..{len(positions) - 1}")
-    repeated = (faces == np.roll(faces, 1, axis=1)).any(axis=1)
-    if repeated.any():
-        bad_face = int(np.argmax(repeated))
-        raise MeshError(f"face {bad_face} = {faces[bad_face].tolist()} names a vertex twice: remove it")
+    bad = np.flatnonzero((faces == np.roll(faces, 1, axis=1)).any(axis=1))
+    if bad.size:
+        raise MeshError(f"face {bad[0]} = {faces[bad[0]].tolist()} names a vertex twice: remove it")
     unused = np.setdiff1d(np.arange(len(positions)), faces)
     if unused.size:
         raise MeshError(f"vertex {unused[0]} belongs to no face: remove it")

@@ -96,10 +96,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     frames = options.frames
     if frames is None:
         frames = obstacle.frames if obstacle is not None and obstacle.frames > 1 else FRAMES_ALONE
-    rides = None
     pins = cloth.rest_positions[cloth.pins]
-    if obstacle is not None and obstacle.moves_beside(pins):
-        rides = obstacle.carrying(pins)
+    rides = obstacle.carrying(pins) if obstacle and obstacle.moves_beside(pins) else None
     motion = simulate(
         cloth, terms, dt=options.dt, frames=frames, obstacle=obstacle, pin_positions=rides,
         progress=path.name,

@@ -28,7 +28,7 @@ from reference_sim.trajectory import Trajectory
 if TYPE_CHECKING:
     from reference_sim.obstacle import Obstacle
 
-GUESSES = ("previous", "extrapolated", "body_transported")
+GUESSES = ("previous", "extrapolated", "body_transported")  # the last needs an obstacle
 FirstGuess = Callable[[int, np.ndarray], np.ndarray]  # see `TimeStepper`
 
 
@@ -86,9 +86,7 @@ class TimeStepper:
             raise ValueError(f"simulate: substeps = {substeps}: must be at least 1")
         if guess is None:
             guess = "extrapolated" if obstacle is None else "body_transported"
-        if not callable(guess) and (
-            guess not in GUESSES or (guess == "body_transported" and obstacle is None)
-        ):
+        if not callable(guess) and guess not in (GUESSES[:-1] if obstacle is None else GUESSES):
             raise ValueError(
                 f"simulate: guess {guess!r}: choose one of {', '.join(GUESSES)}, or give a function;"
                 " body_transported needs an obstacle"
@@ -101,7 +99,7 @@ class TimeStepper:
         self.minimiser = StepMinimiser(self.potential, **options)
 
     def start_again(self) -> None:
-        """Let the next run give the bits of a first one: minimisers forget what they have learned."""
+        """Let the next run give the bits of a first one."""
         self.minimiser.start_again()
 
     def advance(
@@ -165,7 +163,7 @@ class TimeStepper:
         pin_positions: Callable[[int], np.ndarray] | None = None,
         progress: str | None = None,
     ) -> Trajectory:
-        """Simulate as the function `simulate` does; `start_again` stands between two runs."""
+        """Simulate as the function `simulate` does."""
         if frames < 1:
             raise ValueError(f"simulate: frames = {frames}: must be at least 1")
         rest = self.cloth.rest_positions

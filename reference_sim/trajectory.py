@@ -135,12 +135,10 @@ def _write_benchmark(file: h5py.File, trajectory: Trajectory) -> None:
     """Write what VTK has no place for."""
     benchmark = file.create_group("benchmark")
     benchmark.attrs.update(
-        {
-            "frames": trajectory.frames,
-            "status": trajectory.status,
-            "reason": trajectory.reason,
-            "provenance": json.dumps(trajectory.provenance),
-        }
+        frames=trajectory.frames,
+        status=trajectory.status,
+        reason=trajectory.reason,
+        provenance=json.dumps(trajectory.provenance),
     )
     benchmark["frame_seconds"] = np.asarray(trajectory.frame_seconds, dtype="f8")
     fields = benchmark.create_group("frame_fields")

@@ -73,8 +73,8 @@ class Recipe:
             cost a short one much (docs/notebook/training.md).
         terms: energies in the loss, TERMS or any other that `find_energy` knows.
         physics_weight: lambda [cm^2/J] of the loss of networks that learn simulated vertices: mean squared
-            distance [cm^2] + lambda * the sum of `terms` [J]. With 0 the distance alone; energies alone
-            have no such weight. Added later: 0 is in no digest, and what a file without it means.
+            distance [cm^2] + lambda * the sum of `terms` [J]. With 0 the distance alone. Added later: 0
+            is in no digest, and what a file without it means.
         inertia_form: `equation_5` (the inertia of each frame with two before it in its window, through
             which its gradient reaches all three), `detached_past` (the same without a gradient to the two
             frames before, as in Neural Cloth Simulation and GAPS) or `two_transitions` (the published

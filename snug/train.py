@@ -167,9 +167,8 @@ def print_summary(model: TrainedModel) -> None:
     print(f"recipe {model.recipe.name}, {model.summary['training_frames']} frames")
     print(f"last steps, {model.unit} (energies J), mean over frames: " + "  ".join(terms))
     for window in model.summary["named_windows"][:5]:
-        if window["action"] == "gradient clipped":  # which is part of the recipe
-            continue
-        print("step {step}: {window} at {joules} {unit}, {action}".format(**window, unit=model.unit))
+        if window["action"] != "gradient clipped":  # which is part of the recipe
+            print("step {step}: {window} at {joules} {unit}, {action}".format(**window, unit=model.unit))
     print(f"{model.steps} steps in {model.seconds:.0f} s after {model.setup_seconds:.0f} s of preparation, "
           f"{model.megabytes:.1f} MB")  # fmt: skip
 

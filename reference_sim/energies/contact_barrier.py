@@ -104,10 +104,8 @@ class ContactBarrier(Energy):
 
     def sparse_hessian(self, x: np.ndarray, convexity: float = 0.0) -> sp.csc_matrix:
         """Return the second derivatives (3V, 3V) [N/m] at x (V, 3) [m]; see Energy."""
-        if convexity == 0:
-            return self._hessian(x, "NONE")
-        if convexity == 1:
-            return self._hessian(x, "CLAMP")
+        if convexity in (0, 1):
+            return self._hessian(x, "CLAMP" if convexity else "NONE")
         return (1 - convexity) * self._hessian(x, "NONE") + convexity * self._hessian(x, "CLAMP")
 
     def _hessian(self, x: np.ndarray, projection: str) -> sp.csc_matrix:

@@ -215,8 +215,7 @@ def join_seams(surface: Surface, distance: float = JOIN_DISTANCE) -> Surface:
         return surface
     graph = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count))
     of_vertex = connected_components(graph, directed=False)[1]
-    _, firsts = np.unique(of_vertex, return_index=True)
-    ids = np.sort(firsts)
+    ids = np.sort(np.unique(of_vertex, return_index=True)[1])
     place = np.empty(count, dtype=np.int64)
     place[of_vertex[ids]] = np.arange(len(ids))
     faces = place[of_vertex][surface.faces]
@@ -273,6 +272,5 @@ def stretches(corners: np.ndarray, chart: np.ndarray) -> np.ndarray:
     They are the singular values of F = [x1 - x0, x2 - x0] Dm^-1, for corners (F, 3, 3) of the mesh and a
     chart (F, 3, 2), no triangle without area.
     """
-    Dm = np.stack([chart[:, 1] - chart[:, 0], chart[:, 2] - chart[:, 0]], axis=-1)
-    Ds = np.stack([corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]], axis=-1)
+    Dm, Ds = (np.stack([x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]], axis=-1) for x in (chart, corners))
     return np.linalg.svd(Ds @ np.linalg.inv(Dm), compute_uv=False)

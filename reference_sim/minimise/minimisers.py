@@ -114,7 +114,7 @@ class StepMinimiser:
         self._minimiser = make_minimiser(potential, **self._ending)
 
     def start_again(self) -> None:
-        """Let the next run give the bits of a first one: minimisers forget what they have learned."""
+        """Let the next run give the bits of a first one."""
         self.__dict__.pop("_rough_minimiser", None)
         for minimiser in filter(None, (self._opening, self._minimiser)):
             minimiser.start_again()

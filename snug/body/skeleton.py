@@ -76,6 +76,11 @@ def axis_angles(matrices: np.ndarray) -> np.ndarray:
     return Rotation.from_matrix(flat).as_rotvec().reshape(np.shape(matrices)[:-1])
 
 
+def turn_joint(poses: np.ndarray, joint: int, turns: np.ndarray) -> None:
+    """Turn a joint of poses (T, 24, 3) [rad] in place, in its parent's axes, by matrices ([T,] 3, 3)."""
+    poses[:, joint] = axis_angles(turns @ rotation_matrices(poses[:, joint]))
+
+
 def global_rotations(poses: np.ndarray, parents: Sequence[int] = PARENTS) -> np.ndarray:
     """Return the world rotation of every joint (T, J, 3, 3) in poses (T, J, 3) [rad]."""
     rotations = rotation_matrices(poses)
@@ -90,7 +95,7 @@ def joint_positions(poses: np.ndarray, translations: np.ndarray) -> np.ndarray:
 
     poses: (T, 24, 3) [rad]. translations: (T, 3) [m] of the root.
     """
-    return _positions(global_rotations(poses), np.asarray(translations), REST_JOINTS)
+    return _positions(global_rotations(poses), translations, REST_JOINTS)
 
 
 def joint_transforms(
@@ -110,7 +115,7 @@ def joint_transforms(
 def sole_points(poses: np.ndarray, translations: np.ndarray) -> np.ndarray:
     """Return heel, ball and toe tip (T, 6, 3) [m] of the left, then of the right foot."""
     rotations = global_rotations(poses)
-    positions = _positions(rotations, np.asarray(translations), REST_JOINTS)
+    positions = _positions(rotations, translations, REST_JOINTS)
     points = []
     for side, mirror in (("left", 1.0), ("right", -1.0)):
         for name, point in _SOLE:

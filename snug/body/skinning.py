@@ -22,7 +22,7 @@ def joint_transforms(
     """
     world: list[Tensor] = []
     posed: list[Tensor] = []
-    for joint, parent in enumerate(int(p) for p in parents):
+    for joint, parent in enumerate(parents):
         rotation, rest = rotations[..., joint, :, :], joints[..., joint, :]
         if parent < 0:
             world.append(rotation)
@@ -46,7 +46,7 @@ def add_pose_correctives(
     """
     count = directions.shape[2] // 9
     world = transforms[..., :3]
-    bases = world[..., [int(parents[joint]) for joint in range(1, count + 1)], :, :]
+    bases = world[..., list(parents[1 : count + 1]), :, :]
     relative = bases.transpose(-1, -2) @ world[..., 1 : count + 1, :, :]
     entries = (relative - torch.eye(3, dtype=world.dtype, device=world.device)).flatten(-3)
     return points + (entries @ directions.flatten(0, 1).T).unflatten(-1, (-1, 3))

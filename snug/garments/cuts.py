@@ -45,7 +45,7 @@ class CutPlane:
     def height(self, points: Array) -> Array:
         """Return how far (N,) [m] points (N,3) are beyond the bent plane along its normal, at any x."""
         offset = points - self.point
-        return offset @ np.asarray(self.normal) + self.bend * _saturated_square(offset[:, 2])
+        return offset @ self.normal + self.bend * _saturated_square(offset[:, 2])
 
     def depth(self, points: Array) -> Array:
         """Return how far (N,) [m] points (N,3) are on the side that is cut away, to first order."""
@@ -61,7 +61,7 @@ class CutPlane:
 
     def _slope(self, points: Array) -> Array:
         """Return the gradient (N,3) of `height`."""
-        slope = np.tile(np.asarray(self.normal), (len(points), 1))
+        slope = np.tile(self.normal, (len(points), 1))
         offset = points[:, 2] - self.point[2]
         rising = np.minimum(np.abs(offset), np.maximum(2 * BEND_SPAN - np.abs(offset), 0.0))
         slope[:, 2] += 2 * self.bend * np.copysign(rising, offset)

@@ -89,8 +89,7 @@ class Garment:
         transforms = body.transforms(poses, translations, betas)
         blended = np.einsum("pj,tjab->tpab", self.skinning_weights[self.pins], transforms)
         rest = self.rest_for(body, betas)[self.pins]
-        turned = np.einsum("tpab,pb->tpa", blended[..., :3], rest)
-        return turned + blended[..., 3]
+        return np.einsum("tpab,pb->tpa", blended[..., :3], rest) + blended[..., 3]
 
     def rest_for(self, body: Body, betas: ArrayLike | None) -> Array:
         """Return rest positions (V,3) [m] on the body of shape `betas`: vertices move as the skin below them.
@@ -115,7 +114,7 @@ def smooth_weights(values: ArrayLike, faces: Index, iterations: int) -> Array:
     halves = half_edges(faces)
     pairs = np.unique(np.concatenate([halves, halves[:, ::-1]]), axis=0)
     neighbours = coo_array((np.ones(len(pairs)), tuple(pairs.T)), shape=(len(smooth),) * 2).tocsr()
-    degree = np.asarray(neighbours.sum(axis=1)).reshape(-1, 1)
+    degree = neighbours.sum(axis=1).reshape(-1, 1)
     for _ in range(iterations):
         smooth = 0.5 * smooth + 0.5 * (neighbours @ smooth) / degree
     return smooth
@@ -134,7 +133,7 @@ def find_weights(body: Body, positions: Array, faces: Index) -> tuple[Array, Ind
     garment encloses. One tube around both legs is smoothed below the hips as a skirt is.
     """
     followed = skin_following(body, enclosed_limbs(body, positions, faces))
-    skin = np.asarray(body.faces)[followed[body.faces].all(axis=1)]
+    skin = body.faces[followed[body.faces].all(axis=1)]
     search = FaceSearch(skin, body.template[skin].mean(axis=1))
     search.refit(body.template)
     closest = search.nearest(positions)
@@ -162,7 +161,7 @@ def enclosed_limbs(body: Body, positions: Array, faces: Index) -> tuple[str, ...
     winding = igl.fast_winding_number(
         np.asfortranarray(positions), np.asfortranarray(faces), np.asfortranarray(body.template)
     )
-    inside = np.abs(np.asarray(winding).ravel()) > INSIDE
+    inside = np.abs(winding).ravel() > INSIDE
     limbs = {name: skin_following(body, (name,)) for name in JOINT_NAMES if name not in NEVER}
     limbs = {name: skin for name, skin in limbs.items() if skin.any()}
     return tuple(name for name, skin in limbs.items() if inside[skin].mean() > COVERED) or tuple(limbs)
@@ -193,7 +192,7 @@ def name_openings(body: Body, positions: Array, faces: Index) -> dict[str, Index
     if not loops:
         return {}
     centres = [positions[loop].mean(axis=0) for loop in loops]
-    heights = [float(centre[1]) for centre in centres]
+    heights = [centre[1] for centre in centres]
     openings: dict[str, int] = {}
     middle = []
     # The longest loop comes first: of two with one claim it has the name, a slit or a buttonhole has not.
@@ -248,7 +247,7 @@ def _name_beside(body: Body, centre: Array) -> str:
     out = abs(centre[0] - middle)
     if out < MIDDLE * (hip[0] - middle):
         return ""
-    arm = float(np.linalg.norm(joint_position(body, "left_elbow") - shoulder))
+    arm = np.linalg.norm(joint_position(body, "left_elbow") - shoulder)
     beyond = out > shoulder[0] - middle + ARMHOLE * arm
     limb = "leg" if centre[1] <= hip[1] else "sleeve" if beyond else "armhole"
     return f"{'left' if centre[0] > middle else 'right'}_{limb}"

@@ -142,11 +142,10 @@ class _Sections:
         angle = 2 * np.pi * np.arange(SUPPORT_DIRECTIONS) / SUPPORT_DIRECTIONS
         self.normals = np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
-    def support(self, edges: Index, axis: int) -> Array:
-        """Return the support function (L,K) of the sections of edges (E,2) at each node of an axis."""
-        return _fill_levels(
-            _section_support(self.body.template, edges, self.nodes[axis], axis, self.normals)
-        )
+    def support(self, bones: Sequence[str], axis: int) -> Array:
+        """Return the support function (L,K) of the sections of `bones` at each node of an axis."""
+        points, edges = self.body.template, _edges(self.body, bones)
+        return _fill_levels(_section_support(points, edges, self.nodes[axis], axis, self.normals))
 
     def field(self, support: Array, growth: Array, axis: int) -> Array:
         """Return the distance (nx,ny,nz) to sections `support` (L,K) grown by `growth` (L,)."""
@@ -157,13 +156,13 @@ class _Sections:
         return np.moveaxis(distance.reshape(-1, *map(len, plane)), 0, axis)
 
 
-def _torso(sections: _Sections, edges: Index, hang: float, growth: Array, narrowing: float) -> Array:
+def _torso(sections: _Sections, hang: float, growth: Array, narrowing: float) -> Array:
     """Return the field (nx,ny,nz) of sections that hang from height `hang` [m], grown by (ny,) [m].
 
     narrowing: how much [m/m] they may come nearer again on the way down.
     """
     y = sections.nodes[1]
-    support = sections.support(edges, 1)
+    support = sections.support(TORSO_BONES, 1)
     mirrored = (SUPPORT_DIRECTIONS // 2 - np.arange(SUPPORT_DIRECTIONS)) % SUPPORT_DIRECTIONS
     # Both sides of a body that is not quite symmetric.
     support = np.maximum(support, support[:, mirrored])
@@ -176,23 +175,23 @@ def _torso(sections: _Sections, edges: Index, hang: float, growth: Array, narrow
     return np.maximum(sections.field(support, growth, 1), (y - shoulder)[None, :, None])
 
 
-def _sleeve(sections: _Sections, edges: Index, cuff: float, ease: float, clearance: float) -> Array:
+def _sleeve(sections: _Sections, cuff: float, ease: float, clearance: float) -> Array:
     """Return the field (nx,ny,nz) of the left sleeve."""
     x = sections.nodes[0]
     shoulder = joint_position(sections.body, "left_shoulder")[0]
     support = ndimage.gaussian_filter1d(
-        sections.support(edges, 0), 0.02 / GRID_SPACING, axis=0, mode="nearest"
+        sections.support(ARM_BONES, 0), 0.02 / GRID_SPACING, axis=0, mode="nearest"
     )
     growth = clearance + ease / (2 * np.pi) * _ramp(x, shoulder, cuff)
     return np.maximum(sections.field(support, growth, 0), (shoulder - x)[:, None, None])
 
 
-def _leg(sections: _Sections, edges: Index, crotch: float, ease: float, clearance: float) -> Array:
+def _leg(sections: _Sections, crotch: float, ease: float, clearance: float) -> Array:
     """Return the field (nx,ny,nz) of the left leg of trousers."""
     y = sections.nodes[1]
     hip, knee = (joint_position(sections.body, name)[1] for name in ("left_hip", "left_knee"))
     support = ndimage.gaussian_filter1d(
-        sections.support(edges, 1), 0.03 / GRID_SPACING, axis=0, mode="nearest"
+        sections.support(LEG_BONES, 1), 0.03 / GRID_SPACING, axis=0, mode="nearest"
     )
     # Legs that part once do not meet again above: up from the knee the inner side only comes nearer.
     rows, inner = np.flatnonzero(y >= knee), sections.normals[:, 0] < 0
@@ -231,7 +230,6 @@ def build_surface(
     import igl  # not loaded where garments are only named
 
     points = body.template
-    torso_edges, arm_edges, leg_edges = (_edges(body, b) for b in (TORSO_BONES, ARM_BONES, LEG_BONES))
     torso, arm, leg = (skin_following(body, bones) for bones in (TORSO_BONES, ARM_BONES, LEG_BONES))
     hang = top if waistband else points[skin_following(body, ARM_BONES[:1]), 1].min()
     waist = joint_position(body, "pelvis" if waistband else "spine1")[1]
@@ -251,13 +249,13 @@ def build_surface(
     sections, y = _Sections(body, nodes), nodes[1]
     growth = clearance + ease / (2 * np.pi) * _ramp(y, hang, waist)
     growth += flare * np.clip((waist - y) / (waist - hem), 0.0, None)  # a cone: its sides are straight
-    hanging = _torso(sections, torso_edges, hang, growth, TAPER * legs)
+    hanging = _torso(sections, hang, growth, TAPER * legs)
     if cuff is not None:
-        sleeve = _sleeve(sections, arm_edges, cuff, ease, clearance)
+        sleeve = _sleeve(sections, cuff, ease, clearance)
         hanging = _smooth_minimum(hanging, sleeve, ARMPIT_FILLET)
     if legs:
         crotch = legs_part(body, clearance + ease / (2 * np.pi))
-        leg_field = _leg(sections, leg_edges, crotch, ease, clearance)
+        leg_field = _leg(sections, crotch, ease, clearance)
         above_crotch = np.maximum(hanging, (crotch - y)[None, :, None])
         hanging = _smooth_minimum(above_crotch, leg_field, CROTCH_FILLET)
     values = np.minimum(hanging, distance - clearance)  # a blend would add girth wherever both agree

@@ -111,9 +111,8 @@ def _cluster(points: Array, faces: Index, count: int) -> tuple[Array, Index]:
     coarse_faces = igl.bfs_orient(coarse_faces)[0].astype(np.int64)
     nearest = cKDTree(np.asarray(sheet.points)).query(coarse_points[coarse_faces].mean(axis=1))[1]
     normals = vertex_normals(np.asarray(sheet.points, dtype=np.float64), np.asarray(sheet.regular_faces))
-    outward = normals[nearest]
     a, b, c = (coarse_points[coarse_faces[:, k]] for k in range(3))
-    if np.sum(np.cross(b - a, c - a) * outward) < 0:
+    if np.sum(np.cross(b - a, c - a) * normals[nearest]) < 0:
         coarse_faces = coarse_faces[:, ::-1]
     return coarse_points, coarse_faces
 

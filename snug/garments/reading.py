@@ -83,7 +83,7 @@ def read_garment(file: GarmentFile | str | Path, body: Body) -> Garment:
 def _make_garment(file: GarmentFile, body: Body, raw: Surface, material: Material) -> Garment:
     """Return the garment of a surface as it is in the file. Raises ValueError: problem, remedy."""
     refuse_too_many(len(raw.positions))
-    positions = to_metres_y_up(raw.positions, units=file.units, up=file.up) + np.asarray(file.shift)
+    positions = to_metres_y_up(raw.positions, units=file.units, up=file.up) + file.shift
     surface = join_seams(replace(raw, positions=positions), file.weld)
     skin = Obstacle(body.template, body.faces)
     _check_place(file, body, skin, raw)
@@ -117,7 +117,7 @@ def _check_place(file: GarmentFile, body: Body, skin: Obstacle, raw: Surface) ->
     """Raise ValueError unless the garment lies on the body; say which unit or axis mends it."""
     problem, size, fitting = "", "", {}
     for units, up in sorted(product(METRES, UP_AXES), key=lambda axes: axes != (file.units, file.up)):
-        positions = to_metres_y_up(raw.positions, units=units, up=up) + np.asarray(file.shift)
+        positions = to_metres_y_up(raw.positions, units=units, up=up) + file.shift
         distances = skin.signed_distance(positions, 0)
         misfit = _misfit(body, skin, positions, raw.faces, distances)
         if (units, up) == (file.units, file.up):
@@ -148,7 +148,7 @@ def _misfit(body: Body, skin: Obstacle, positions: Array, faces: Index, distance
         share = np.mean(distances < 0)
         return f"it lies up to {1e3 * depth:.0f} mm deep in the body, with {share:.0%} of it"
     corners = positions[faces]
-    at_ends = np.asarray(skin_following(body, ENDS)[body.faces].all(axis=1))
+    at_ends = np.all(skin_following(body, ENDS)[body.faces], axis=1)
     ends = at_ends[skin.planes(corners.mean(axis=1), 0).faces]
     share = np.average(ends, weights=corner_areas(corners))
     return f"{share:.0%} of it lies around head, hands or feet" if share > 0.5 else ""

@@ -137,7 +137,7 @@ def _parse_bones(lines: Iterator[list[str]]) -> tuple[dict[str, Bone], float]:
             bone = unattached.setdefault(" ".join(tokens), Bone())
         elif section == ":bonedata" and word == "direction":
             direction = np.array(finite_numbers(tokens, 3))
-            length = float(np.linalg.norm(direction))
+            length = np.linalg.norm(direction)
             if not 1e-6 < length < 1e6:
                 raise ValueError("a bone's direction cannot be zero, nor so long")
             bone.direction = direction / length

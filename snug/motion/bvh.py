@@ -99,7 +99,8 @@ def _find_axes(at: Mapping[str, np.ndarray]) -> tuple[np.ndarray, float]:
     leg = float(np.linalg.norm(hip - knee) + np.linalg.norm(knee - ankle))
     way = at["head"] - 0.5 * (at["left_ankle"] + at["right_ankle"])
     up = np.zeros(3)
-    up[np.abs(way).argmax()] = np.sign(way[np.abs(way).argmax()])
+    axis = np.abs(way).argmax()
+    up[axis] = np.sign(way[axis])
     left = at["left_hip"] - at["right_hip"]
     left -= up * (up @ left)
     across = float(np.linalg.norm(left))

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.spatial.transform import Rotation
 
-from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
+from snug.body.skeleton import JOINT, turn_joint
 from snug.motion.motion import Motion, smoothstep
 from snug.motion.posture import RATE, SIDED, SPINE_SHARES, STANDING, poses_from_angles, root_path
 
@@ -242,14 +242,14 @@ def twist(degrees: float, hertz: float, hips: float, stop: float) -> Frames:
 
     With hips = 1 the body turns as one piece, as on a turntable. At LIBRARY_FPS.
     """
-    time = np.arange(round(stop * LIBRARY_FPS) + 1 + FROZEN_FRAMES) / LIBRARY_FPS
-    time = np.minimum(time, round(stop * LIBRARY_FPS) / LIBRARY_FPS)
+    last = round(stop * LIBRARY_FPS)
+    time = np.minimum(np.arange(last + 1 + FROZEN_FRAMES), last) / LIBRARY_FPS
     yaw = degrees * np.sin(2 * np.pi * hertz * time) * smoothstep(time / ONSET)
     poses = poses_from_angles(STANCE, len(time))
     shares = {"pelvis": hips} | {name: share * (1.0 - hips) for name, share in SPINE_SHARES}
     for name, share in shares.items():
         turn = Rotation.from_euler("y", (share * yaw)[:, None], degrees=True).as_matrix()
-        poses[:, JOINT[name]] = axis_angles(turn @ rotation_matrices(poses[:, JOINT[name]]))
+        turn_joint(poses, JOINT[name], turn)
     translations = np.zeros((len(time), 3))
     translations[:, 1] = root_path(poses[:2])[0, 1]
     return poses, translations

@@ -7,6 +7,7 @@ docs/protocol.md. Nothing heavy is loaded before a motion is made, so that names
 from __future__ import annotations
 
 import csv
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -141,4 +142,4 @@ def _segment(name: str, clip: Motion) -> Motion:
     turned = turn_about_vertical(part, -heading(part.poses[0]))
     turned.translations[:, 1] += part.translations[0, 1]  # the floor stays where it is
     source = f"{clip.source}; frames {start} to {stop - 1}"
-    return Motion(name, turned.poses, turned.translations, clip.fps, clip.kind, source)
+    return replace(turned, name=name, source=source)

@@ -16,6 +16,7 @@ from snug.body.skeleton import (
     joint_positions,
     rotation_matrices,
     sole_points,
+    turn_joint,
 )
 
 # Upper arm to the spine's direction: on the default body this leaves about 2 cm between arm and chest.
@@ -106,7 +107,7 @@ def spread_arms(motion: Motion, degrees: float = 20.0) -> Motion:
     poses = motion.poses.copy()
     for joint, sign in ((JOINT["left_shoulder"], 1.0), (JOINT["right_shoulder"], -1.0)):
         turn = rotation_matrices(np.array([0.0, 0.0, sign * np.deg2rad(degrees)]))
-        poses[:, joint] = axis_angles(turn @ rotation_matrices(poses[:, joint]))
+        turn_joint(poses, joint, turn)
     source = f"{motion.source}; arms spread by {degrees:g} degrees".lstrip("; ")
     return replace(motion, poses=poses, source=source)
 
@@ -153,9 +154,7 @@ def transition(pose_a: np.ndarray, pose_b: np.ndarray, frames: int) -> np.ndarra
     Source:
         T. Flash and N. Hogan, The coordination of arm movements, Journal of Neuroscience 5 (1985).
     """
-    ease = smoothstep(np.linspace(0.0, 1.0, frames)[:, None])
-    shape = (frames, 24, 3)
-    return slerp(np.broadcast_to(pose_a, shape), np.broadcast_to(pose_b, shape), ease)
+    return slerp(pose_a, pose_b, smoothstep(np.linspace(0.0, 1.0, frames)[:, None]))
 
 
 def smoothstep(s: np.ndarray) -> np.ndarray:
@@ -171,10 +170,9 @@ def place(motion: Motion) -> Motion:
     percentile of the lower foot's height over all frames is taken for the floor.
     """
     placed = turn_about_vertical(motion, -heading(motion.poses[0]))
-    poses, translations = placed.poses, placed.translations
-    lowest = sole_points(poses, translations)[..., 1].min(axis=1)
-    translations[:, 1] -= np.percentile(lowest, 2.0)
-    return replace(motion, poses=poses, translations=translations)
+    lowest = sole_points(placed.poses, placed.translations)[..., 1].min(axis=1)
+    placed.translations[:, 1] -= np.percentile(lowest, 2.0)
+    return placed
 
 
 def heading(pose: np.ndarray) -> float:
@@ -188,7 +186,7 @@ def turn_about_vertical(motion: Motion, angle: float) -> Motion:
     """Turn the whole motion by an angle [rad] about the vertical, and begin it above the origin."""
     turn = rotation_matrices(np.array([0.0, angle, 0.0]))
     poses = motion.poses.copy()
-    poses[:, 0] = axis_angles(turn @ rotation_matrices(poses[:, 0]))
+    turn_joint(poses, 0, turn)
     translations = (motion.translations - motion.translations[0]) @ turn.T
     return replace(motion, poses=poses, translations=translations)
 
@@ -229,7 +227,7 @@ def _limb_angles(motion: Motion, limb: tuple[str, str], trunk: tuple[str, str]) 
 
 
 def slerp(poses_a: np.ndarray, poses_b: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Interpolate between poses (..., 3) [rad] along the shortest arc, by a share (...) in [0, 1]."""
+    """Interpolate between poses (..., 3) [rad] along the shortest arc, by shares (...) in [0, 1]."""
     start = rotation_matrices(poses_a)
     arc = axis_angles(np.swapaxes(start, -1, -2) @ rotation_matrices(poses_b))
     return axis_angles(start @ rotation_matrices(arc * share[..., None]))

@@ -19,11 +19,11 @@ SIDED = {
     "hip_flexion": 2.0, "hip_abduction": 3.0, "hip_rotation": 5.0, "knee_flexion": 4.0, "foot_pitch": 0.0,
     "arm_lowering": 68.0, "arm_flexion": 0.0, "elbow_flexion": 15.0,
 }  # fmt: skip
-CENTRAL = {
-    "pelvis_pitch": 0.0, "pelvis_roll": 0.0, "pelvis_yaw": 0.0, "trunk_flexion": 0.0, "trunk_bend": 0.0,
-    "trunk_twist": 0.0, "head_pitch": 0.0, "head_yaw": 0.0,
-}  # fmt: skip
-STANDING = CENTRAL | {
+CENTRAL = (
+    "pelvis_pitch", "pelvis_roll", "pelvis_yaw", "trunk_flexion", "trunk_bend", "trunk_twist", "head_pitch",
+    "head_yaw",
+)  # fmt: skip
+STANDING = dict.fromkeys(CENTRAL, 0.0) | {
     f"{side}_{name}": value for side in ("left", "right") for name, value in SIDED.items()
 }
 

@@ -23,6 +23,7 @@ from snug.body.skeleton import (
     axis_angles,
     joint_positions,
     rotation_matrices,
+    turn_joint,
 )
 from snug.motion.motion import Motion, MotionError
 
@@ -202,7 +203,7 @@ def turn_y_up(motion: Motion, up: str) -> Motion:
         )
     note = f"{up} up as given" if up else f"{axis} up, as the body stands in {share}"
     poses, turn = motion.poses.copy(), TO_Y_UP[axis]
-    poses[:, 0] = axis_angles(turn @ rotation_matrices(poses[:, 0]))
+    turn_joint(poses, 0, turn)
     translations = motion.translations @ turn.T
     return replace(motion, poses=poses, translations=translations, source=f"{motion.source}; {note}")
 

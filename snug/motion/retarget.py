@@ -88,8 +88,8 @@ def _alignment(
         turn = _frame(theirs, hinges[hinge]) @ _frame(ours, np.array(HINGES[hinge], dtype=float)).T
     else:
         axis = np.cross(ours, theirs)
-        sine = float(np.linalg.norm(axis))
-        angle = float(np.arctan2(sine, ours @ theirs))
+        sine = np.linalg.norm(axis)
+        angle = np.arctan2(sine, ours @ theirs)
         if angle > (ASTRIDE if hinge.endswith("knee") else ARMS_DOWN):
             raise MotionError(
                 f"its zero pose is no T or A pose: {name} is turned by {np.degrees(angle):.0f} "

@@ -35,7 +35,7 @@ class DressedBody:
         self.body, self.garment = body, garment
         self.cloth = garment.cloth()
         self.vertices = len(garment.rest_positions)
-        self.parents = [int(parent) for parent in body.parents]
+        self.parents = body.parents.tolist()
         self._weights: dict[int, Tensor] = {}
 
     def weights(self, smoothing: int) -> Tensor:
@@ -45,13 +45,13 @@ class DressedBody:
         garments get sweeps in proportion to their vertices, and are smoothed over the same length.
         """
         if smoothing not in self._weights:
-            borrowed = weights = np.asarray(self.garment.skinning_weights)
+            borrowed = weights = self.garment.skinning_weights
             if smoothing:
                 sweeps = max(1, round(smoothing * self.vertices / 1000))
                 weights = smooth_weights(weights, self.garment.faces, sweeps)
                 # Where the simulator's handles are.
                 weights[self.garment.pins] = borrowed[self.garment.pins]
-            self._weights[smoothing] = torch.as_tensor(np.asarray(weights), dtype=torch.float32)
+            self._weights[smoothing] = torch.as_tensor(weights, dtype=torch.float32)
         return self._weights[smoothing]
 
     def rest(self, betas: np.ndarray | None = None) -> Tensor:
@@ -62,7 +62,7 @@ class DressedBody:
         mean = torch.as_tensor(self.garment.rest_positions, dtype=torch.float32)
         if betas is None:
             return mean
-        shapes = torch.as_tensor(np.asarray(betas), dtype=torch.float32)
+        shapes = torch.as_tensor(betas, dtype=torch.float32)
         return mean + torch.einsum("...s,svi->...vi", shapes, self.rest_directions)
 
     @cached_property
@@ -102,9 +102,8 @@ class DressedBody:
         """
         if feature_set == "joint_motion":
             pose, rates = joint_motion(self.body, motion, betas)
-            return torch.from_numpy(
-                np.concatenate([pose, rates * (not still)], axis=1).astype(np.float32)
-            )
+            parts = [pose, rates * (not still)]
+            return torch.from_numpy(np.concatenate(parts, axis=1).astype(np.float32))
         rotations = rotation_matrices(motion.poses)
         parts = [_pose_numbers(motion.poses, rotations, recipe.pose_input)]
         if feature_set == "motion":
@@ -114,10 +113,10 @@ class DressedBody:
                 velocity = np.einsum("tji,tj->ti", rotations[:, 0], velocity)
             parts.append(velocity * (not still))
         if feature_set in ("motion", "pose_shape"):
-            shape = np.zeros(self.body.shape_count) if betas is None else np.asarray(betas)
+            shape = np.zeros(self.body.shape_count) if betas is None else betas
             if feature_set == "pose_shape":
                 shape = np.pad(shape, (0, SHAPES - len(shape)))
-            parts.append(np.broadcast_to(shape, (len(motion.poses), len(shape))))
+            parts.append(np.broadcast_to(shape, (motion.frames, len(shape))))
         return torch.from_numpy(np.concatenate(parts, axis=1).astype(np.float32))
 
     def skin(

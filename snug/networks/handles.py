@@ -39,7 +39,7 @@ def shape_functions(garment: Garment, handles: int) -> np.ndarray:
     centres = farthest_points(rest, handles)
     away = rest[:, None] - rest[centres]
     distances = np.linalg.norm(away, axis=2)
-    radius = float(distances.min(axis=1).max())
+    radius = distances.min(axis=1).max()
     weights = compact_weights(distances, REACH * radius)
     affine = np.concatenate([away / radius, np.ones((*weights.shape, 1))], axis=2)
     functions = weights[..., None] * affine

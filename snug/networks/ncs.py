@@ -57,7 +57,7 @@ def joint_motion(
     turning = _rate(rotations, fps)
     turning[:, 0] = rotations[:, 0].swapaxes(-1, -2) @ turning[:, 0]
     acceleration = np.einsum("tjba,tjb->tja", world, _rate(_rate(positions, fps), fps))
-    frames = len(motion.poses)
+    frames = motion.frames
     pose = [_columns(rotations[:, 1:]).reshape(frames, -1), down.reshape(frames, -1)]
     rates = [_columns(turning), _rate(down, fps), acceleration]
     return np.concatenate(pose, axis=1), np.concatenate(rates, axis=2).reshape(frames, -1)

@@ -138,11 +138,11 @@ def _trajectory(
     seconds: np.ndarray,
 ) -> Trajectory:
     """Return the trajectory of world positions (T, V, 3) [m] of the frames `held` of the motion."""
-    finite = bool(np.isfinite(positions).all())
+    finite = np.isfinite(positions).all()
     method = dict(method=model.kind, recipe=model.recipe.name, seed=model.seed) if model else SKINNING
     return Trajectory(
         positions=positions,
-        faces=np.asarray(dressed.garment.faces),
+        faces=dressed.garment.faces,
         times=held / motion.fps,
         frame_seconds=seconds,
         status="ok" if finite else "diverged",
@@ -268,7 +268,7 @@ def _features(
     """
     if model.vertices != dressed.vertices:
         raise RollOutError(f"the model has {model.vertices} vertices, the garment {dressed.vertices}")
-    if model.triangles and model.triangles != digest_triangles(np.asarray(dressed.garment.faces)):
+    if model.triangles and model.triangles != digest_triangles(dressed.garment.faces):
         raise RollOutError(
             "the model is of a garment with as many vertices and other triangles: tailor the garment that it "
             "was trained for, or train one for this"

@@ -60,11 +60,9 @@ class FrequencyMixture(GarmentNetwork):
         """Return the low and the high band of the offsets, each (N, T, V, 3) [m]."""
         normalised = self.normalise(features)
         drop = [None, None] if masks is None else list(masks)
-        low, high = self.low(normalised, drop[0]), self.high(normalised[..., :-SHAPES], drop[1])
-        shape = (self.vertices, 3)
-        return (self.output_scale * low).unflatten(-1, shape), (self.output_scale * high).unflatten(
-            -1, shape
-        )
+        flat = self.low(normalised, drop[0]), self.high(normalised[..., :-SHAPES], drop[1])
+        low, high = ((self.output_scale * band).unflatten(-1, (self.vertices, 3)) for band in flat)
+        return low, high
 
     def forward(self, features: Tensor, state: Tensor | None = None) -> tuple[Tensor, None]:
         """Return offsets (N, T, V, 3) [m] and no state."""

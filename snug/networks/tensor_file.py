@@ -35,7 +35,7 @@ def write_tensors(path: Path, tensors: Mapping[str, Tensor], header: Mapping[str
 
 def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
     """Read tensors and header. Raises TensorFileError for a missing, broken, changed or foreign file."""
-    tensors, text = _read(path, "pt")
+    tensors, text = _read(path)
     header = _parse(path, text)
     if header.pop(DIGEST, None) != _digest(tensors, header):
         raise TensorFileError(f"{path}: is not as it was written: copy it again, or train again")
@@ -44,16 +44,16 @@ def read_tensors(path: Path) -> tuple[dict[str, Tensor], dict[str, Any]]:
 
 def read_header(path: Path) -> dict[str, Any]:
     """Read the header alone, without torch and unchecked against its digest. Raises TensorFileError."""
-    return _parse(path, _read(path, "numpy", tensors=False)[1])
+    return _parse(path, _read(path, tensors=False)[1])
 
 
-def _read(path: Path, framework: str, *, tensors: bool = True) -> tuple[dict[str, Tensor], str | None]:
+def _read(path: Path, *, tensors: bool = True) -> tuple[dict[str, Tensor], str | None]:
     from safetensors import SafetensorError, safe_open
 
     if not path.is_file():
         raise TensorFileError(f"{path}: no such model file")
     try:
-        with safe_open(path, framework=framework) as stored:
+        with safe_open(path, framework="pt" if tensors else "numpy") as stored:
             text = (stored.metadata() or {}).get(HEADER)
             names = stored.keys() if tensors else ()
             return {name: stored.get_tensor(name) for name in names}, text

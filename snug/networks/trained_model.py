@@ -85,7 +85,7 @@ class TrainedModel:
             "format": MODEL_FORMAT,
             "kind": self.kind,
             "recipe": self.recipe.as_dict(),
-            "inputs": int(self.network.input_mean.shape[0]),
+            "inputs": self.network.input_mean.shape[0],
             "vertices": self.vertices,
             "pins": [int(pin) for pin in self.network.pins],
             **{name: getattr(self, name) for name in _COPIED},

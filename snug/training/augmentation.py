@@ -15,7 +15,7 @@ from dataclasses import replace
 import numpy as np
 import torch
 
-from snug.body.skeleton import JOINT, axis_angles, rotation_matrices
+from snug.body.skeleton import JOINT, axis_angles, rotation_matrices, turn_joint
 from snug.kinds import Kind
 from snug.motion.motion import Motion, arm_clearance, lap_clearance, mirror_motion
 from snug.networks.dressed_body import DressedBody
@@ -119,8 +119,7 @@ def _mix(
     for hip in HIPS:
         height = random.uniform(0.0, np.deg2rad(LIFT_DEGREES)) * (random.random() < lifted)
         phase = 2 * np.pi * (random.uniform(*TURN_HERTZ) * seconds + random.random())
-        forward = rotation_matrices(-0.5 * height * (1 + np.sin(phase)) * SIDEWAYS)
-        poses[:, hip] = axis_angles(forward @ rotation_matrices(poses[:, hip]))
+        turn_joint(poses, hip, rotation_matrices(-0.5 * height * (1 + np.sin(phase)) * SIDEWAYS))
     mixed = open_hips(Motion(name, poses, translations, fps=fps, kind="mixed"))
     return hang_arms(mixed, np.deg2rad(random.uniform(*ARM_DEGREES, 2)))
 
@@ -134,9 +133,7 @@ def hang_arms(motion: Motion, nearest: np.ndarray) -> Motion:
     poses = motion.poses.copy()
     outward = (nearest - arm_clearance(motion).min(axis=0)) * [1.0, -1.0]
     for shoulder, angle in zip(SHOULDERS, outward):
-        poses[:, shoulder] = axis_angles(
-            rotation_matrices(angle * FRONT) @ rotation_matrices(poses[:, shoulder])
-        )
+        turn_joint(poses, shoulder, rotation_matrices(angle * FRONT))
     return replace(motion, poses=poses)
 
 
@@ -150,8 +147,7 @@ def open_hips(motion: Motion) -> Motion:
         turns = np.maximum(0.0, np.deg2rad(HIP_DEGREES) - lap_clearance(motion))
         poses = motion.poses.copy()
         for hip, angles in zip(HIPS, turns.T):
-            back = rotation_matrices(angles[:, None] * SIDEWAYS)
-            poses[:, hip] = axis_angles(back @ rotation_matrices(poses[:, hip]))
+            turn_joint(poses, hip, rotation_matrices(angles[:, None] * SIDEWAYS))
         motion = replace(motion, poses=poses)
     return motion
 

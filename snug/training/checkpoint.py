@@ -79,9 +79,9 @@ def describe_run(trainer: Trainer, **facts: Any) -> dict[str, Any]:
     digest, data, dressed = hashlib.sha256(), trainer.data, trainer.dressed
     tensors = [data.features, data.transforms, data.lead, data.rest, trainer.weights]
     tensors += [trainer.targets.vertices] if trainer.targets else []
-    body = dressed.body
+    body, cloth = dressed.body, dressed.cloth
     shape = (body.template, body.faces, body.shape_directions, body.joint_directions)
-    for array in (*(tensor.cpu().numpy() for tensor in tensors), *shape, dressed.cloth.Dm_inverse):
+    for array in (*(tensor.cpu().numpy() for tensor in tensors), *shape, cloth.Dm_inverse):
         digest.update(array.tobytes())
     return {
         "kind": trainer.kind,
@@ -92,8 +92,8 @@ def describe_run(trainer: Trainer, **facts: Any) -> dict[str, Any]:
         "threads": torch.get_num_threads(),
         "device": trainer.device.type,
         "kernels": trainer.kernels,
-        "vertices": trainer.dressed.vertices,
+        "vertices": dressed.vertices,
         "data": digest.hexdigest(),
-        "material": asdict(trainer.dressed.cloth.material),
+        "material": asdict(cloth.material),
         **facts,
     }

@@ -132,13 +132,12 @@ class TensorContactCache:
         distances = torch.where(inside | ~inside.any(1, keepdim=True), distances, torch.inf)
         nearest = distances.topk(min(NEAREST, len(positions)), largest=False).indices
         faces = self.around[nearest].flatten(1)  # (S, NEAREST K)
-        a, b, c = positions[self.corners[faces.clamp(min=0)]].unbind(-2)
+        some = faces.clamp(min=0)
+        a, b, c = positions[self.corners[some]].unbind(-2)
         s, t, r = b - a, c - a, points[:, None] - a
         v, w = closest_on_triangle(s, t, r)
         squared = (r - v[..., None] * s - w[..., None] * t).square().sum(-1)
-        outside = (self.centroids[faces.clamp(min=0)] - home[:, None]).square().sum(
-            -1
-        ) >= self.patch.region**2
+        outside = (self.centroids[some] - home[:, None]).square().sum(-1) >= self.patch.region**2
         squared = torch.where(faces < 0, torch.inf, squared + FORBIDDEN * outside)
         best = squared.argmin(1, keepdim=True)
         pick = [table.gather(1, best)[:, 0] for table in (faces, v, w)]

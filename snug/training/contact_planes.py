@@ -49,14 +49,13 @@ class BodyPatches:
     ) -> None:  # fmt: skip
         body, device = data.dressed.body, data.device
         self.data, self.kernels, self.normals = data, kernels, normals
-        self.weights, self.template, self.directions = (
-            torch.as_tensor(array[vertices], dtype=torch.float32, device=device)
-            for array in (body.skinning_weights, body.template, body.shape_directions)
-        )
-        self.correctives: Tensor | None = None
-        if body.pose_directions is not None:
-            correctives = body.pose_directions[vertices]
-            self.correctives = torch.as_tensor(correctives, dtype=torch.float32, device=device)
+
+        def part(array: np.ndarray) -> Tensor:
+            return torch.as_tensor(array[vertices], dtype=torch.float32, device=device)
+
+        self.weights, self.template = part(body.skinning_weights), part(body.template)
+        self.directions, given = part(body.shape_directions), body.pose_directions
+        self.correctives = None if given is None else part(given)
         self._pose = compile_for(self._pose_by_torch, device)
         self.kept = self._pose_everywhere() if fixed and self.kernels else None
 
@@ -116,9 +115,8 @@ class BodyPatches:
         for rest, frames in self._list_patches():
             for start in range(frames.start, frames.stop, POSED_TOGETHER):
                 some = slice(start, min(start + POSED_TOGETHER, frames.stop))
-                positions[some], normals[some] = self._pose_by_kernels(
-                    rest, self.data.transforms[None, some]
-                )
+                transforms = self.data.transforms[None, some]
+                positions[some], normals[some] = self._pose_by_kernels(rest, transforms)
         return positions, normals
 
     def _list_patches(self) -> Iterator[tuple[Tensor, slice]]:

@@ -66,19 +66,18 @@ class DivergenceGuard:
         self._number, self._joules, self._name = number, joules, name
         bad = ~np.isfinite(joules)
         if bad.any():
-            self._leave_out(bad, "update left out")
+            self._leave_out(np.flatnonzero(bad), "update left out")
             return "leave out"
         spike = math.inf if self.spike is None or number < SETTLING else self.spike
         mean = float(joules.mean(dtype=np.float64))
         peaks = joules > spike
         runaway = self.usual is not None and mean > max(spike, RUNAWAY * abs(self.usual))
-        if runaway:
-            if self._count_bad():
-                return "leave out"
-        else:
+        if runaway and self._count_bad():
+            return "leave out"
+        if not runaway:
             self.usual = mean if self.usual is None else MEMORY * self.usual + (1 - MEMORY) * mean
         if peaks.any():
-            self._remark(peaks, "gradient clipped")
+            self._remark(np.flatnonzero(peaks), "gradient clipped")
         return "distrust" if runaway else "clip" if peaks.any() else "update"
 
     def accepts(self, verdict: str, gradient_norm: float) -> bool:
@@ -96,16 +95,15 @@ class DivergenceGuard:
                     self._good = {name: tensor.detach().clone() for name, tensor in live}
                     self.good_step = self._number
             return True
-        highest = np.arange(len(self._joules)) == np.argmax(self._joules)
-        self._leave_out(highest, "gradient not finite, update left out")
+        self._leave_out(np.argmax(self._joules, keepdims=True), "gradient not finite, update left out")
         return False
 
-    def _leave_out(self, mask: np.ndarray, action: str) -> None:
-        self._remark(mask, action)
+    def _leave_out(self, rows: np.ndarray, action: str) -> None:
+        self._remark(rows, action)
         self.summary["skipped_updates"] += 1
         self.skipped_in_a_row += 1
         if self.skipped_in_a_row >= GIVE_UP:
-            name = self._name(int(np.argmax(mask)))
+            name = self._name(int(rows[0]))
             raise TrainingError(f"training diverged: {GIVE_UP} updates in a row not finite, last {name}")
         self._count_bad()
 
@@ -114,7 +112,7 @@ class DivergenceGuard:
         self.bad_in_a_row += 1
         if self.bad_in_a_row < PATIENCE or not self._good:
             return False
-        highest = np.arange(len(self._joules)) == np.argmax(np.nan_to_num(self._joules, nan=np.inf))
+        highest = np.argmax(np.nan_to_num(self._joules, nan=np.inf), keepdims=True)
         self._remark(highest, f"weights of step {self.good_step} restored, rate halved")
         for name, tensor in live_tensors(self.network, self.optimiser):
             if name in self._good:
@@ -127,8 +125,8 @@ class DivergenceGuard:
         self.bad_in_a_row = 0
         return True
 
-    def _remark(self, mask: np.ndarray, action: str) -> None:
-        for row in np.flatnonzero(mask).tolist():
+    def _remark(self, rows: np.ndarray, action: str) -> None:
+        for row in rows.tolist():
             self.summary["high_windows"] += not action.startswith("weights")
             if len(self.summary["named_windows"]) < NAMED_WINDOWS:
                 window, value = self._name(row), repr(float(self._joules[row]))

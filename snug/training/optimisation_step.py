@@ -168,9 +168,8 @@ class Trainer:
         batch = self.data.batch(windows, betas)
         if self.loss is None:
             assert self.targets is not None
-            return self._update(
-                number, windows, self.targets.terms(self.network, batch, state, self.posed_by)
-            )[0]
+            terms = self.targets.terms(self.network, batch, state, self.posed_by)
+            return self._update(number, windows, terms)[0]
         offsets, end = self.network(batch.features, state)
         # Offsets first: the sum then lies in memory as they do.
         x = self.posed_by(offsets + batch.rest, self.weights, batch.transforms)

@@ -196,7 +196,7 @@ def on_device(energy: EnergyType, device: torch.device) -> EnergyType:
 class PhysicsLoss:
     """Energies of sub-sequences of frames `dt` [s] apart, by term of the recipe.
 
-    kernels: use closed forms on a CPU (in numpy and numba) where there are any, else the definitions.
+    kernels: on a CPU, use closed forms where there are any, else the definitions.
     """
 
     def __init__(

@@ -31,7 +31,7 @@ from torch import Tensor
 
 from reference_sim.cloth import edge_table
 from reference_sim.files.atomic_files import replacing
-from snug.body.skinning import skin, unskin
+from snug.body.skinning import unskin
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
 from snug.networks.garment_network import GarmentNetwork
@@ -164,7 +164,7 @@ class VertexTargets:
         network: GarmentNetwork,
         batch: Batch,
         state: Tensor | None,
-        posed_by: Callable[..., Tensor] = skin,
+        posed_by: Callable[..., Tensor],
     ) -> dict[str, Tensor]:
         """Return parts of the loss of each window and frame, name -> (N, T). posed_by: skin, or its equal."""
         offsets, _ = network(batch.features, state)
@@ -180,17 +180,11 @@ class VertexTargets:
 class BandTargets(VertexTargets):
     """Simulated vertices, unposed and taken apart into two bands; arguments as for VertexTargets."""
 
-    def __init__(
-        self,
-        data: TrainingSet,
-        motions: Sequence[Motion],
-        trajectories: Trajectories | None,
-        weights: Tensor,
-    ) -> None:
-        super().__init__(data, motions, trajectories, weights)
+    def __init__(self, data: TrainingSet, *arguments: Any) -> None:
+        super().__init__(data, *arguments)
         vertices, transforms = self.vertices.cpu(), data.transforms.cpu()
-        offsets = unskin(vertices, weights.cpu(), transforms) - data.dressed.rest()
-        low = smooth_offsets(offsets.numpy(), np.asarray(data.dressed.garment.faces))
+        offsets = unskin(vertices, self.weights.cpu(), transforms) - data.dressed.rest()
+        low = smooth_offsets(offsets.numpy(), data.dressed.garment.faces)
         self.low = torch.as_tensor(low, dtype=torch.float32).to(data.device)
         self.high = offsets.to(data.device) - self.low
 
@@ -199,7 +193,7 @@ class BandTargets(VertexTargets):
         network: GarmentNetwork,
         batch: Batch,
         state: Tensor | None,
-        posed_by: Callable[..., Tensor] = skin,
+        posed_by: Callable[..., Tensor],
     ) -> dict[str, Tensor]:
         """Return the loss of both bands of the unposed offsets, name -> (N, T)."""
         rows = torch.as_tensor(batch.frames)
@@ -224,8 +218,7 @@ def smooth_offsets(offsets: np.ndarray, faces: np.ndarray) -> np.ndarray:
     on_rim = np.zeros(count, dtype=bool)
     on_rim[edges[border]] = True
     pairs = np.concatenate([edges, edges[:, ::-1]])
-    rim = np.concatenate([border] * 2)
-    pairs = pairs[rim | ~on_rim[pairs[:, 0]]]
+    pairs = pairs[np.tile(border, 2) | ~on_rim[pairs[:, 0]]]
     links = coo_array((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(count, count)).tocsr()
     mean = diags_array(1.0 / links.sum(axis=1)) @ links
     flat = np.ascontiguousarray(offsets.transpose(1, 0, 2)).reshape(count, -1)

@@ -1,7 +1,4 @@
-"""Train a network. The command is snug.train.
-
-Between the steps of a training come its log and checkpoints.
-"""
+"""Train a network, with log and checkpoints between its steps. The command is snug.train."""
 
 from __future__ import annotations
 
@@ -50,6 +47,11 @@ class TrainingLoop:
         self.recent: list[dict[str, float]] = []
         self._started = self._saved = time.perf_counter()
 
+    @property
+    def elapsed(self) -> float:
+        """Time [s] of all steps so far."""
+        return self.seconds + time.perf_counter() - self._started
+
     def run(self) -> TrainedModel:
         """Take all steps, from the last checkpoint on if there is one; return the model.
 
@@ -74,7 +76,9 @@ class TrainingLoop:
     def _between_steps(self, bar: Any) -> None:
         last = self.done == self.trainer.steps
         if len(self.recent) == self.every or last:
-            row = self._row()
+            row = {"step": self.done, "seconds": self.elapsed}
+            row |= {name: float(np.mean([r[name] for r in self.recent])) for name in self.recent[0]}
+            self.recent = []
             self.history.append(row)
             bar.set_postfix(loss=f"{row['loss']:.4g}", refresh=False)
             if self.log:
@@ -83,18 +87,11 @@ class TrainingLoop:
         if checkpoint and not last and 0 < 60 * checkpoint.minutes < time.perf_counter() - self._saved:
             self._save(checkpoint)
 
-    def _row(self) -> dict[str, float]:
-        """Return the row of the history over the recent steps, and begin the next."""
-        row = {"step": self.done, "seconds": self.seconds + time.perf_counter() - self._started}
-        row |= {name: float(np.mean([r[name] for r in self.recent])) for name in self.recent[0]}
-        self.recent = []
-        return row
-
     def _save(self, checkpoint: Checkpoint) -> None:
         tensors, facts = self.trainer.state()
         state = {
             "done": self.done,
-            "seconds": self.seconds + time.perf_counter() - self._started,
+            "seconds": self.elapsed,
             "history": self.history,
             "recent": self.recent,
             "trainer": facts,
@@ -103,15 +100,11 @@ class TrainingLoop:
         self._saved = time.perf_counter()
 
     def _resume(self) -> None:
-        if self.checkpoint is None:
-            return
-        stored = self.checkpoint.read(self.identity)
-        if stored is None:
-            return
-        tensors, state = stored
-        self.trainer.resume(tensors, state["trainer"])
-        self.done, self.seconds = state["done"], state["seconds"]
-        self.history, self.recent = state["history"], state["recent"]
+        if self.checkpoint and (stored := self.checkpoint.read(self.identity)):
+            tensors, state = stored
+            self.trainer.resume(tensors, state["trainer"])
+            self.done, self.seconds = state["done"], state["seconds"]
+            self.history, self.recent = state["history"], state["recent"]
 
     def model(self) -> TrainedModel:
         """Return the model after the steps done so far."""
@@ -123,7 +116,7 @@ class TrainingLoop:
         }
         return TrainedModel(
             trainer.kind, trainer.network.cpu().eval(), trainer.recipe, seed=trainer.seed, steps=self.done,
-            seconds=self.seconds + time.perf_counter() - self._started, setup_seconds=self.setup_seconds,
+            seconds=self.elapsed, setup_seconds=self.setup_seconds,
             history=self.history, summary=summary, unit=trainer.spec.unit, fps=1.0 / trainer.data.dt,
             triangles=digest_triangles(trainer.dressed.garment.faces),
         )  # fmt: skip

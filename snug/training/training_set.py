@@ -79,7 +79,7 @@ class TrainingSet:
         self.dressed, self.recipe, self.device = dressed, recipe, device
         self._ends_in_shape = features == "motion"
         self.names = [motion.name for motion in motions]
-        self.first = np.cumsum([0, *(len(motion.poses) for motion in motions)])
+        self.first = np.cumsum([0, *(motion.frames for motion in motions)])
         self.shapes = shapes
         pairs = list(zip(motions, [None] * len(motions) if shapes is None else shapes))
         inputs = [dressed.features(m, recipe, betas, feature_set=features) for m, betas in pairs]
@@ -100,12 +100,8 @@ class TrainingSet:
         self._repose = compile_for(_repose, device)
         self.window = recipe.window if sequences else 1
         stride = recipe.window_stride if sequences else 1
-        self.starts = np.concatenate(
-            [
-                np.arange(first, first + len(motion.poses) - self.window + 1, stride)
-                for first, motion in zip(self.first, motions)
-            ]
-        )
+        spans = zip(self.first[:-1], self.first[1:] - self.window + 1)
+        self.starts = np.concatenate([np.arange(*span, stride) for span in spans])
         if len(self.starts) == 0:
             raise TrainingError(f"no training motion has {self.window} frames: give longer motions")
 
@@ -143,14 +139,12 @@ class TrainingSet:
         Each line is on the body of its motion, or of its shape in betas (N, S).
         """
         rows = torch.as_tensor(frames, device=self.device)
-        if betas is not None:
-            return replace(self.gather(rows, torch.as_tensor(betas, device=self.device)), frames=frames)
-        batch = replace(self.gather(rows), frames=frames)
-        if self.shapes is None:
+        shapes = None if betas is None else torch.as_tensor(betas, device=self.device)
+        batch = replace(self.gather(rows, shapes), frames=frames)
+        if betas is not None or self.shapes is None:
             return batch
-        return self._dress(
-            batch, torch.as_tensor(self.shapes[self.motion_of(frames[:, 0])], device=self.device)
-        )
+        own = self.shapes[self.motion_of(frames[:, 0])]
+        return self._dress(batch, torch.as_tensor(own, device=self.device))
 
     def gather(self, rows: Tensor, betas: Tensor | None = None) -> Batch:
         """Return rows (N, T) on the device, each line on the mean body or that of shape numbers (N, S).
@@ -162,11 +156,9 @@ class TrainingSet:
         if betas is None:
             return batch
         reposed = self._repose(self.dressed.parents, *self._skeleton, batch.transforms, betas.double())
-        batch = self._dress(replace(batch, transforms=reposed), betas)
-        assert batch.betas is not None
-        repeated = batch.betas[:, None].expand(-1, rows.shape[1], -1)
+        repeated = betas.float()[:, None].expand(-1, rows.shape[1], -1)
         inputs = torch.cat([batch.features[..., : -betas.shape[1]], repeated], -1)
-        return replace(batch, features=inputs)
+        return self._dress(replace(batch, transforms=reposed, features=inputs), betas)
 
     def gather_past(self, frames: np.ndarray, count: int) -> Tensor:
         """Return the features (N, count, D) before rows (N,), in place of missing ones a motion's first."""
