@@ -46,13 +46,9 @@ def by_name(kind: str, entries: Iterable[Entry]) -> dict[str, Entry]:
     index: dict[str, Entry] = {}
     for entry in entries:
         if entry.name in index:
-            both = (index[entry.name], entry)
-            homes = [getattr(e, "declared_in", None) for e in both]
-            by = (
-                ""
-                if None in homes
-                else ", by " + " and by ".join(h or "the project itself" for h in homes)
-            )
+            homes = [getattr(e, "declared_in", None) for e in (index[entry.name], entry)]
+            names = " and by ".join(home or "the project itself" for home in homes)
+            by = "" if None in homes else f", by {names}"
             raise DeclarationError(f"{kind} '{entry.name}' is declared twice{by}: rename one")
         index[entry.name] = entry
     return index

@@ -13,8 +13,7 @@ ROW = 2 / 3**0.5  # of the equilateral family: distance of neighbours in a colum
 def jittered_patch(cells: int) -> tuple[np.ndarray, np.ndarray]:
     """Return a Delaunay mesh of the unit square: points (V,2) [m], faces (F,3), counter-clockwise."""
     random = np.random.default_rng(0)
-    i, j = np.meshgrid(np.arange(cells + 1), np.arange(cells + 1), indexing="ij")
-    points = np.stack([i, j], -1).astype(float)
+    points = np.moveaxis(np.indices((cells + 1, cells + 1)), 0, -1).astype(float)
     points[1:-1, 1:-1] += random.uniform(-0.3, 0.3, (cells - 1, cells - 1, 2))
     points = points.reshape(-1, 2) / cells
     return points, delaunay_faces(points)
@@ -40,9 +39,7 @@ def right_grid(rows: int, columns: int, height: float, width: float) -> tuple[np
     >>> points.shape, len(faces)
     ((6, 2), 4)
     """
-    y, x = np.meshgrid(
-        np.linspace(0, height, rows + 1), np.linspace(0, width, columns + 1), indexing="ij"
-    )
+    x, y = np.meshgrid(np.linspace(0, width, columns + 1), np.linspace(0, height, rows + 1))
     a, b, c, d = _corners(rows, columns)
     faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
     return np.stack([x.ravel(), y.ravel()], 1), faces
@@ -76,7 +73,7 @@ def icosphere(subdivisions: int, radius: float) -> tuple[np.ndarray, np.ndarray]
     corners = [(0.0, s, t * golden) for s in (-1, 1) for t in (-1, 1)]
     points = np.array([np.roll(corner, k) for k in range(3) for corner in corners])
     edges = np.isclose(np.linalg.norm(points[:, None] - points[None], axis=2), 2.0)
-    i, j, k = np.meshgrid(*[np.arange(12)] * 3, indexing="ij")
+    i, j, k = np.indices((12, 12, 12))
     faces = np.argwhere((i < j) & (i < k) & edges[i, j] & edges[j, k] & edges[k, i])
     faces = faces[np.linalg.det(points[faces]) > 0]
     for _ in range(subdivisions):
@@ -103,20 +100,16 @@ def torus(cells: int, major: float, minor: float) -> tuple[np.ndarray, np.ndarra
     Returns:
         Points (V,3) [m], faces (F,3), and H (V,) [1/m].
     """
-    u, v = np.meshgrid(
-        np.linspace(0, 2 * np.pi, 2 * cells, endpoint=False),
-        np.linspace(0, 2 * np.pi, cells, endpoint=False),
-        indexing="ij",
-    )
-    ring = major + minor * np.cos(v)
+    i, j = np.indices((2 * cells, cells))
+    u, v = np.pi / cells * i, 2 * np.pi / cells * j
+    across = minor * np.cos(v)
+    ring = major + across
     points = np.stack([ring * np.cos(u), minor * np.sin(v), ring * np.sin(u)], -1).reshape(-1, 3)
-    i, j = np.meshgrid(np.arange(2 * cells), np.arange(cells), indexing="ij")
     i_next, j_next = (i + 1) % (2 * cells), (j + 1) % cells
-    a, b, c, d = (p * cells + q for p, q in ((i, j), (i_next, j), (i_next, j_next), (i, j_next)))
-    faces = np.concatenate(
-        [np.stack([a, b, c], -1).reshape(-1, 3), np.stack([a, c, d], -1).reshape(-1, 3)]
-    )
-    return points, faces, ((major + minor * np.cos(v) + minor * np.cos(v)) / (2 * minor * ring)).ravel()
+    around = ((i, j), (i_next, j), (i_next, j_next), (i, j_next))
+    a, b, c, d = ((p * cells + q).ravel() for p, q in around)
+    faces = np.concatenate([np.stack([a, b, c], 1), np.stack([a, c, d], 1)])
+    return points, faces, ((ring + across) / (2 * minor * ring)).ravel()
 
 
 def rectangle(
@@ -193,7 +186,7 @@ def square_sheet(cells: int, size: float) -> tuple[np.ndarray, np.ndarray]:
     diagonals alternate, so that no direction of the mesh is special. Vertex i * (cells + 1) + j is the
     j-th along z of the i-th row along x.
     """
-    i, j = np.meshgrid(np.arange(cells + 1), np.arange(cells + 1), indexing="ij")
+    i, j = np.indices((cells + 1, cells + 1))
     nudge = np.random.default_rng(0).uniform(-0.25, 0.25, (2, *i.shape))
     nudge[:, [0, -1], :] = 0.0
     nudge[:, :, [0, -1]] = 0.0

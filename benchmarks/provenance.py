@@ -69,13 +69,11 @@ def processor_name() -> str:
     Clouds give processors of several generations one name, which run times and last bits are not the same
     of.
     """
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").partition("\n\n")[0].splitlines()
-    except OSError:
-        lines = []  # not Linux
-    facts = {
-        name.strip(): " ".join(value.split()) for name, _, value in (s.partition(":") for s in lines)
-    }
+    facts: dict[str, str] = {}
+    with suppress(OSError):  # not Linux
+        first = Path("/proc/cpuinfo").read_text(encoding="utf-8").partition("\n\n")[0]
+        lines = (line.partition(":") for line in first.splitlines())
+        facts = {name.strip(): " ".join(value.split()) for name, _, value in lines}
     name = facts.get("model name") or platform.processor() or platform.machine()
     details = [
         f"{key.split()[-1]} {facts[key]}" for key in ("cpu family", "model", "stepping") if key in facts

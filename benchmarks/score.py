@@ -124,7 +124,7 @@ def plan_score(
     """Return the plan of a roll-out, and of what it is evaluated beside, in one scene.
 
     Args:
-        study: whose body, garment, motions and sizes the scene has.
+        study: as of `score`.
         roll_out: [NAME=]FILE, with ,units=cm and the like behind it.
         scene: its name; empty with a rest mesh.
         rest_mesh: of a roll-out that brings its own scene.

@@ -1,7 +1,7 @@
 """The report as a list of blocks: headings, figures and tables in their order.
 
 The PDF and the page walk the same BLOCKS, below the sentences of page one. A block without content is
-left out, and so is a heading with nothing below it. Blocks before the first heading make page one.
+left out. Blocks before the first heading make page one.
 A new figure is a function of reports.figures.charts and a line here.
 """
 

@@ -376,10 +376,9 @@ def _exceeds_noise(metric: Metric, shift: Effect, p: float | None) -> bool:
 
 def _select_common(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:
     """Return the usable rows of both, without cases, of scenes that have all seeds of their group."""
+
+    def count_seeds(frame: pd.DataFrame, *keys: str) -> pd.Series:
+        return frame.groupby([*keys])["seed"].transform("nunique")
+
     rows = _intersect([f[f["usable"] & (f["case"] == "")] for f in (one, other)], *CELL)
-    whole = [
-        frame.groupby([*GROUP, "scene"])["seed"].transform("nunique")
-        == frame.groupby(GROUP)["seed"].transform("nunique")
-        for frame in rows
-    ]
-    return [frame[full] for frame, full in zip(rows, whole)]
+    return [f[count_seeds(f, *GROUP, "scene") == count_seeds(f, *GROUP)] for f in rows]

@@ -144,9 +144,8 @@ def entries_tables(
 ) -> list[tuple[Table, Sequence[Scored]]]:
     """Return a table for each protocol and set of scenes, full ones first, and whom its rows are of.
 
-    No table has rows of two protocols, or means over different scenes. Methods of the published run of
-    that name stand in each table of their protocol. Rows are sorted by relative excess; rows without it, or
-    with roll-outs that are missing or fell off, are last.
+    Methods of the published run of that name stand in each table of their protocol. Rows are sorted by
+    relative excess; rows without it, or with roll-outs that are missing or fell off, are last.
     """
     full = full_scenes(run)
     groups: dict[tuple[str, tuple[str, ...]], list[Scored]] = {(run.protocol, tuple(sorted(full))): []}

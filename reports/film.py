@@ -90,7 +90,7 @@ def write_frames(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:
         for x in islice(frames, 0, None, step)
     ]
     ends = [10 * round(100.0 * (k + 1) / rate) for k in range(len(drawn))]
-    durations = [end - start for start, end in zip([0, *ends], ends)]
+    durations = np.diff(ends, prepend=0).tolist()
     drawn[0].save(path, save_all=True, append_images=drawn[1:], duration=durations, loop=0)
 
 
@@ -98,7 +98,8 @@ def write_point_caches(path: Path, group: SceneRollOuts) -> None:
     """Write the vertices of each method, and of the body, as NAME_METHOD.pc2 with an .obj beside it."""
     from reference_sim.trajectory import write_point_cache
 
-    for name, mesh in ({**group.series, **({"body": group.body} if group.body else {})}).items():
+    body = {"body": group.body} if group.body else {}
+    for name, mesh in {**group.series, **body}.items():
         write_point_cache(path.with_stem(f"{path.stem}_{name.replace('/', '-')}"), mesh)
 
 

@@ -127,6 +127,10 @@ class Run:
         unseen = rows[~rows["scene"].isin(self.with_motion("training"))]
         return rows if unseen.empty else unseen
 
+    def select_garment(self, garment: str) -> pd.DataFrame:
+        """Return the garment_rows of one garment."""
+        return self.garment_rows[self.garment_rows["garment"] == garment]
+
     def with_motion(self, role: str) -> list[str]:
         """Return the scenes, as declared, whose motion has that role: training, validation or test."""
         scenes = self.config.get("scenes") or {}
@@ -148,14 +152,11 @@ class Run:
 
     def order(self, methods: Iterable[str]) -> list[str]:
         """Return the methods without repeats: by role, then as declared, members of a family by level."""
-        places = list(self.methods)
-        first: dict[str, int] = {}
-        for method in self.methods.values():
-            first.setdefault(method.family, places.index(method.name))
+        families = [method.family for method in self.methods.values()]
 
         def rank(name: str) -> tuple[int, int, float, str]:
             method = self.methods[name]
-            return ROLES.index(method.role), first[method.family], method.level or 0.0, name
+            return ROLES.index(method.role), families.index(method.family), method.level or 0.0, name
 
         return sorted(set(methods), key=rank)
 
@@ -257,7 +258,7 @@ def _cases(frame: pd.DataFrame, declared: Mapping[str, Any]) -> list[str]:
 
 
 def read_run(folder: RunFolder) -> Run:
-    """Read rows and declarations of a run; its roll-outs are read when they are asked for.
+    """Read rows and declarations of a run.
 
     Raises:
         ResultsError: when run.json or results.csv is absent, broken or of an earlier version, or rows are

@@ -173,15 +173,13 @@ class SceneRollOuts:
 
 def camera_path(group: SceneRollOuts, axes: np.ndarray) -> tuple[np.ndarray, float]:
     """Return the camera's target in each frame (T,3) [m], smoothed, and half the height that it sees [m]."""
-    cloths = group.series.values()
-    frames = max(cloth.frames for cloth in cloths)
-    paths = [cloth.positions @ axes for cloth in cloths]
+    frames, dt = group.longest.frames, group.longest.dt
+    paths = [cloth.positions @ axes for cloth in group.series.values()]
     low, high = (
         [np.pad(ends, ((0, frames - len(ends)), (0, 0)), mode="edge") for ends in corners]
         for corners in ([x.min(axis=1) for x in paths], [x.max(axis=1) for x in paths])
     )
     lowest, highest = np.min(low, axis=0), np.max(high, axis=0)
-    dt = group.longest.dt
     reach = 0 if np.isnan(dt) else int(SMOOTHED / dt / 2.0)
     centres = uniform_filter1d((lowest + highest) / 2.0, 2 * reach + 1, axis=0, mode="nearest")
     right, up, _ = np.maximum(highest - centres, centres - lowest).max(axis=0)

@@ -29,7 +29,7 @@ def headline(run: Run) -> list[tuple[str, str]]:
 
 @lru_cache(maxsize=4)
 def _write_topics(run: Run) -> dict[str, str]:
-    rows = run.garment_rows[run.garment_rows["garment"] == run.first_garment]
+    rows = run.select_garment(run.first_garment)
     rows = add_excess(run, rows)
     return {
         "Verdict": verdict(run, rows),

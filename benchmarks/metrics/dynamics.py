@@ -192,9 +192,8 @@ def hem_motion(reference: RollOut) -> HemMotion | None:
     group, dressed = reference.group, reference.scene.dressed
     if dressed is None or group.quasi_static is None:
         return None
-    motion = dressed.motion
     return HemMotion(
-        axes=rotation_matrices(motion.poses[:, 0]),
+        axes=rotation_matrices(dressed.motion.poses[:, 0]),
         origins=dressed.pelvis,
         hem=dressed.garment.hem,
         simulated=reference.positions,

@@ -143,9 +143,8 @@ def penetration(
         present = [k for k, positions in enumerate(trajectories) if frame < len(positions)]
         points = [samples[k].points(trajectories[k][frame]) for k in present]
         distances = np.asarray(obstacle.signed_distance(np.concatenate(points), frame))
-        for k, distance in zip(
-            present, np.split(distances, np.cumsum([len(part) for part in points])[:-1])
-        ):
+        ends = np.cumsum([len(part) for part in points])
+        for k, distance in zip(present, np.split(distances, ends[:-1])):
             x, inside = trajectories[k][frame], distance < 0.0
             weights = samples[k].weights(x)
             results[k].depth[frame] = np.maximum(0.0, -distance[: len(x)])

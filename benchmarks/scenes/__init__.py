@@ -108,16 +108,12 @@ def shapes(motion: str, garment: str = "tshirt") -> list[Scene]:
         str(place): tuple(random.uniform(-3, 3) for _ in range(10)) for place in range(1, SHAPES + 1)
     }
     return [
-        Scene(
+        replace(
+            GarmentScenes(garment, "").scene(motion, "clip"),
             name=f"shapes/{name}",
             description=f"{motion} (its liveliest part) on "
             + (f"body shape {name} of {SHAPES} unseen ones" if betas else "the mean body"),
-            module="benchmarks.scenes.dressed_body:build_dressed_body",
-            sizes=("settle_frames", "warm_up_frames"),
             options={"betas": betas},
-            garment=garment,
-            motion=motion,
-            part="clip",
             metrics=("energy", "geometry", "body_shape"),
         )
         for name, betas in {"mean": (), **drawn}.items()

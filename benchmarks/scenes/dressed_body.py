@@ -77,20 +77,23 @@ def build_dressed_body(
 
 def dress(scene: Scene, dressed: Dressed, **fields: Any) -> BuiltScene:
     """Return the scene of a garment on a moving body, with further fields of BuiltScene."""
-    body, garment, motion, shape = dressed.body, dressed.garment, dressed.motion, dressed.betas
-    posed = body.vertices(motion.poses, motion.translations, shape)
-    handles = garment.pin_positions(body, motion.poses, motion.translations, shape)
     return BuiltScene(
-        name=scene.name,
-        dt=1.0 / motion.fps,
-        frames=motion.frames,
-        # Which faces a vertex may touch is a matter of the body that the garment was made for.
-        obstacle=Obstacle(posed, body.faces, rest_positions=body.rest_vertices()),
-        origin_heights=dressed.pelvis[:, 1],
-        dressed=dressed,
-        pin_positions=handles.__getitem__ if len(garment.pins) else None,
-        **fields,
+        name=scene.name, dressed=dressed, origin_heights=dressed.pelvis[:, 1], **_pose(dressed), **fields
     )
+
+
+def _pose(dressed: Dressed) -> dict[str, Any]:
+    """Return dt, frames, obstacle and pins of a motion, for a scene and for `simulate`."""
+    body, garment, motion, betas = dressed.body, dressed.garment, dressed.motion, dressed.betas
+    posed = body.vertices(motion.poses, motion.translations, betas)
+    handles = garment.pin_positions(body, motion.poses, motion.translations, betas)
+    return {
+        "dt": 1.0 / motion.fps,
+        "frames": motion.frames,
+        # Which faces a vertex may touch is a matter of the body that the garment was made for.
+        "obstacle": Obstacle(posed, body.faces, rest_positions=body.rest_vertices()),
+        "pin_positions": handles.__getitem__ if len(garment.pins) else None,
+    }
 
 
 def shape_of(body: Body, betas: tuple[float, ...], scene: str) -> np.ndarray | None:
@@ -157,14 +160,8 @@ def _simulate(
     cloth: Cloth, energies: tuple[Energy, ...], dressed: Dressed, start: np.ndarray, aim: str
 ) -> np.ndarray:
     """Simulate every frame of the motion, (T,V,3) [m]. Raises RuntimeError naming the missed `aim`."""
-    body, garment, motion, betas = dressed.body, dressed.garment, dressed.motion, dressed.betas
-    posed = body.vertices(motion.poses, motion.translations, betas)
-    handles = garment.pin_positions(body, motion.poses, motion.translations, betas)
-    trajectory: Trajectory = simulate(
-        cloth, energies, dt=1.0 / motion.fps, frames=motion.frames, start=start,
-        obstacle=Obstacle(posed, body.faces, rest_positions=body.rest_vertices()),
-        pin_positions=handles.__getitem__ if len(garment.pins) else None,
-    )  # fmt: skip
+    motion = dressed.motion
+    trajectory: Trajectory = simulate(cloth, energies, start=start, **_pose(dressed))
     # A step that diverges ends a simulation: a garment is left half-way, on a body that moved on.
     if trajectory.frames < motion.frames:
         raise RuntimeError(

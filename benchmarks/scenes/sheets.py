@@ -85,11 +85,8 @@ def build_flag(scene: Scene, assets: object = None, *, sheet_cells: int, sheet_f
     def handles(frame: int) -> np.ndarray:
         """Return the pole in a frame, (P,3) [m]: it starts from rest, so that the first frame has no jolt."""
         phase = 2.0 * np.pi * frame * DT / PERIOD
-        return positions[pole] + [
-            0.0,
-            0.0,
-            SWING * np.sin(phase) * (1.0 - np.cos(min(phase, np.pi))) / 2.0,
-        ]
+        swing = SWING * np.sin(phase) * (1.0 - np.cos(min(phase, np.pi))) / 2.0
+        return positions[pole] + [0.0, 0.0, swing]
 
     return _built(scene, cloth, sheet_frames, positions, pin_positions=handles)
 

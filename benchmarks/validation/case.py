@@ -100,11 +100,11 @@ class Case:
         if not math.isfinite(value):
             return Measurement(reason=f"the measured number is {value}", expected=expected)
         reason = ""
-        if self.tolerance is not None and expected is None:
+        if self.tolerance is None:
+            pass  # reported, not judged
+        elif expected is None:
             reason = "a tolerance, but nothing to compare with"
-        elif (
-            self.tolerance is not None and expected is not None and abs(value - expected) > self.tolerance
-        ):
+        elif abs(value - expected) > self.tolerance:
             reason = f"{value:.6g} is further than {self.tolerance:g} from {expected:g} ({self.reason})"
         return Measurement(
             value=value, status="failed" if reason else "ok", reason=reason, expected=expected

@@ -133,7 +133,7 @@ def _leaving(rate: int) -> float:
     contact = energies.ContactPenalty(cloth, samples="vertices", stiffness=HARD)
     density = contact.stiffness[0] / contact.sample_areas[0]
     depth = np.sqrt(COTTON.areal_density * sim.GRAVITY * np.cos(START) / (3 * density))
-    turn = np.array([[np.cos(START), np.sin(START), 0], [-np.sin(START), np.cos(START), 0], [0, 0, 1.0]])
+    turn = RoundBody(RADIUS, turn=START).at(1)
     start = (corners + np.array([0.0, RADIUS, 0.0])) @ turn.T
     start *= (RADIUS + contact.margin - depth) / np.linalg.norm(start, axis=1, keepdims=True)
     body: Any = RoundBody(RADIUS)
@@ -182,14 +182,14 @@ def _strip_on_drum() -> tuple[np.ndarray, ...]:
         x = minimum([energies.StretchStVK(cloth), energies.Gravity(cloth), contact], x, tolerance=1e-9)
     weight = cloth.material.areal_density * sim.GRAVITY
     columns = len(np.unique(points[:, 0])) - 1
-    grid = x.reshape(3, columns + 1, 3).mean(axis=0)  # the middle line
+    grid = x.reshape(3, -1, 3).mean(axis=0)  # the middle line
     width, cell = np.ptp(points[:, 1]), np.ptp(points[:, 0]) / columns
     # Force through each cell from the forces on all vertices to its left: equilibrium by free-body cut.
-    strain = energies.StretchStVK(cloth).value_and_gradient(x)[1].reshape(3, columns + 1, 3).sum(axis=0)
+    strain = energies.StretchStVK(cloth).value_and_gradient(x)[1].reshape(3, -1, 3).sum(axis=0)
     tension = np.linalg.norm(np.cumsum(strain, axis=0)[:-1], axis=1) / width
     middle = 0.5 * (grid[1:] + grid[:-1])
     expected = tension[0] + weight * (middle[:, 1] - middle[0, 1])
-    push = -contact.value_and_gradient(x)[1].reshape(3, columns + 1, 3).sum(axis=0)
+    push = -contact.value_and_gradient(x)[1].reshape(3, -1, 3).sum(axis=0)
     upper = grid[:, 1] > 0.15 * DRUM
     pressure = np.linalg.norm(push, axis=1)[upper] / (width * cell)
     radius = np.linalg.norm(grid[upper, :2], axis=1)

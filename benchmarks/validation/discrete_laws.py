@@ -57,9 +57,8 @@ def moving_pins_in_substeps() -> float:
 
     def between(step: int) -> np.ndarray:
         frame, part = divmod(step, steps)
-        return (
-            places + pulled[frame] + part / steps * (pulled[min(frame + 1, frames - 1)] - pulled[frame])
-        )
+        before, after = pulled[frame], pulled[min(frame + 1, frames - 1)]
+        return places + before + part / steps * (after - before)
 
     run = partial(motion, scene.cloth, scene.energies, start=scene.start)
     coarse = run(dt=scene.dt, frames=frames, substeps=steps, pin_positions=lambda n: places + pulled[n])
@@ -141,10 +140,10 @@ def unique_step() -> float:
     cells = 12
     size = SPACING * cells
     cloth = flat_cloth(*right_grid(cells, cells, size, size))
-    inertia = energies.Inertia(cloth, 0.9 * bound)
+    inertia, rest = energies.Inertia(cloth, 0.9 * bound), cloth.rest_positions
     random = np.random.default_rng(5)
-    inertia.x_hat = cloth.rest_positions + random.normal(0, 0.3 * SPACING, cloth.rest_positions.shape)
-    starts = (random.uniform(-size, size, cloth.rest_positions.shape) for _ in range(2))
+    inertia.x_hat = rest + random.normal(0, 0.3 * SPACING, rest.shape)
+    starts = (random.uniform(-size, size, rest.shape) for _ in range(2))
     return farthest(
         *(minimum([energies.StretchStVK(cloth), inertia], x, tolerance=1e-12) for x in starts)
     )

@@ -26,25 +26,21 @@ from reference_sim import energies
 CELLS, SIZE, DT = 8, 0.4, 1.0 / 30.0
 PINS = {"corners": (0, CELLS), "none": (), "side": tuple(range(CELLS + 1))}
 MARGIN = 4e-3  # [m] of the contact penalty
+NOISE = 2e-3  # [m] of a noisy start
 DEADLINE = 60.0  # [s] for one step, after which its process is ended
 
 Start = Callable[[np.ndarray, np.random.Generator], np.ndarray]  # of positions (V, 3) [m]
 
 
-def perturb(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """Return positions moved by a micrometre, enough to leave a saddle."""
-    return x + random.normal(0, 1e-6, x.shape)
-
-
-def noisy(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
-    """Return positions with noise of 2 mm."""
-    return x + random.normal(0, 2e-3, x.shape)
+def perturb(x: np.ndarray, random: np.random.Generator, size: float = 1e-6) -> np.ndarray:
+    """Return positions with noise of that size [m]; a micrometre leaves a saddle."""
+    return x + random.normal(0, size, x.shape)
 
 
 def fold(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
     """Return the half x > 0 turned up about the z axis by half a turn, perturbed."""
     arm = np.maximum(x[:, 0], 0.0)
-    x[:, 0] += arm * (np.cos(np.pi) - 1.0)
+    x[:, 0] -= 2.0 * arm
     x[:, 1] += arm * np.sin(np.pi)
     return perturb(x, random)
 
@@ -58,13 +54,13 @@ def twist(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
 
 def collapsed_triangle(x: np.ndarray, random: np.random.Generator) -> np.ndarray:
     """Return a noisy start with two neighbours at one place: their hinges have no angle."""
-    x = noisy(x, random)
+    x = perturb(x, random, NOISE)
     x[41] = x[40]
     return x
 
 
 STARTS: dict[str, Start] = {  # of the rest positions of a horizontal sheet about the origin
-    "noisy": noisy,
+    "noisy": partial(perturb, size=NOISE),
     "flat": lambda x, random: x,
     "point": lambda x, random: np.zeros_like(x),
     "anywhere in 0.4 m": lambda x, random: random.uniform(-0.2, 0.2, x.shape),
@@ -86,10 +82,10 @@ VELOCITIES: dict[
 
 def sliver_row(x: np.ndarray) -> np.ndarray:
     """Return the sheet with one row of cells of aspect 1e4 between even ones."""
-    column = np.round((x[:, 0] / np.ptp(x[:, 0]) + 0.5) * 8)
-    width = np.ptp(x[:, 0]) / 8
-    x[:, 0] = np.where(column == 4, np.ptp(x[:, 0]) * (3 / 8 - 0.5) + 1e-4 * width, x[:, 0])
-    x[:, 0] = np.where(column == 3, -width, x[:, 0])
+    width = np.ptp(x[:, 0]) / CELLS
+    column = np.round(x[:, 0] / width) + CELLS // 2
+    x[column == 4, 0] = 1e-4 * width - width
+    x[column == 3, 0] = -width
     return x
 
 

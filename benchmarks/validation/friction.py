@@ -47,19 +47,17 @@ PATH = partial(
 @PATH({"friction_slope_below": {"ratio": 0.8}, "friction_slope_at": {"ratio": 1.0}})
 def slope_path(ratio: float) -> float:
     """Return the worst distance of a patch on a slope to its path by (1), over 30 steps."""
-    path, downhill = _slope(ratio)
-    angle = np.arctan(ratio * MU)
-    exact = _slip(0.0, ratio, DT * MU * sim.GRAVITY * np.cos(angle) / SPEED, steps=30)
-    return float(np.abs((path - path[0]) @ downhill - exact).max())
+    slid, c, _ = _slide(ratio)
+    exact = _slip(0.0, ratio, DT * MU * sim.GRAVITY * c / SPEED, steps=30)
+    return float(np.abs(slid - exact).max())
 
 
 @PATH({"friction_slide": {"ratio": 1.2}})
 def slide_path(ratio: float) -> float:
     """Return the worst distance of a patch on a slope to the path of the constant g (sin a - mu cos a)."""
-    path, downhill = _slope(ratio)
-    angle, n = np.arctan(ratio * MU), np.arange(31)
-    exact = sim.GRAVITY * (np.sin(angle) - MU * np.cos(angle)) * DT**2 * n * (n + 1) / 2
-    return float(np.abs((path - path[0]) @ downhill - exact).max())
+    (slid, c, s), n = _slide(ratio), np.arange(31)
+    exact = sim.GRAVITY * (s - MU * c) * DT**2 * n * (n + 1) / 2
+    return float(np.abs(slid - exact).max())
 
 
 @PATH({"friction_belt": {}, "friction_belt_in_substeps": {"substeps": 4}})
@@ -100,10 +98,13 @@ def _slip(u: float, drive: float, c: float, *, steps: int, dt: float = DT) -> np
     return np.array(slipped)
 
 
-def _slope(ratio: float) -> tuple[np.ndarray, np.ndarray]:
-    c, s = (function(np.arctan(ratio * MU)) for function in (np.cos, np.sin))
+def _slide(ratio: float) -> tuple[np.ndarray, float, float]:
+    """Return the way (31,) [m] of a patch down a slope, cosine and sine of its angle."""
+    angle = np.arctan(ratio * MU)
+    c, s = np.cos(angle), np.sin(angle)
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-    return _patch(turn=turn, frames=31), -turn[:, 0]
+    path = _patch(turn=turn, frames=31)
+    return (path - path[0]) @ -turn[:, 0], c, s
 
 
 def _patch(
@@ -167,7 +168,7 @@ def _excess(mu: float, columns: int) -> float:
     )[-1]  # fmt: skip
     strain = energies.StretchStVK(cloth).value_and_gradient(x)[1]
     pulls = [float(np.linalg.norm(strain[side].sum(axis=0))) for side in sides]
-    line = x.reshape(3, columns + 1, 3).mean(axis=0)
+    line = x.reshape(3, -1, 3).mean(axis=0)
     first, last = line[1] - line[0], line[-1] - line[-2]
     wrap = np.arccos(first @ last / np.linalg.norm(first) / np.linalg.norm(last))
     return float(np.log(max(pulls) / min(pulls)) - mu * wrap)

@@ -53,8 +53,8 @@ def bent_strip(
         terms.append(energies.Gravity(cloth, acceleration=acceleration))
     if load:
         forces = np.zeros_like(cloth.rest_positions)
-        share = cloth.vertex_areas[strip.tip] / cloth.vertex_areas[strip.tip].sum()
-        forces[strip.tip, 1] = -load * strip.stiffness / length**2 * strip.width * share
+        areas = cloth.vertex_areas[strip.tip]
+        forces[strip.tip, 1] = -load * strip.stiffness / length**2 * strip.width * (areas / areas.sum())
         terms.append(DeadLoad(cloth, forces))
     s, (x, drop) = exact_elastica(weight, load)
     rest = cloth.rest_positions

@@ -206,12 +206,11 @@ def gradient(X: np.ndarray, Y: np.ndarray) -> np.ndarray:
     """Return F = dx/dX (3, 2, ...)."""
     along = np.pi * np.cos(np.pi * X) * np.sin(np.pi * Y)
     across = np.pi * np.sin(np.pi * X) * np.cos(np.pi * Y)
-    rows = (
-        (1.15 + 0.04 * along, 0.04 * across),
-        (np.zeros_like(X) + 0.05 * Y * (1 - Y), 1.1 + 0.05 * X * (1 - 2 * Y)),
-        (0.15 * along, 0.15 * across),
-    )
-    return np.stack([np.stack(row) for row in rows])
+    return np.array([
+        [1.15 + 0.04 * along, 0.04 * across],
+        [0.05 * Y * (1 - Y), 1.1 + 0.05 * X * (1 - 2 * Y)],
+        [0.15 * along, 0.15 * across],
+    ])  # fmt: skip
 
 
 LINEAR = "linear triangles; random meshes scatter the slope"

@@ -27,12 +27,10 @@ TWO_CYCLE = 1.0886617668
 def newton_quadratic() -> float:
     """Return the factorisations for inertia and weight alone: one to step, one to confirm the minimum."""
     cloth = _patch(5)
-    inertia = energies.Inertia(cloth, 1 / 30)
-    inertia.x_hat = cloth.rest_positions + np.random.default_rng(0).normal(
-        0, 0.1, cloth.rest_positions.shape
-    )
+    inertia, rest = energies.Inertia(cloth, 1 / 30), cloth.rest_positions
+    inertia.x_hat = rest + np.random.default_rng(0).normal(0, 0.1, rest.shape)
     potential = sim.Potential([inertia, energies.Gravity(cloth)])
-    result = demand_converged(sim.minimise(potential, cloth.rest_positions), "the minimiser")
+    result = demand_converged(sim.minimise(potential, rest), "the minimiser")
     return float(result.factorisations)
 
 

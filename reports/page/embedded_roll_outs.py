@@ -162,13 +162,14 @@ def embed(folder: RunFolder, run: Run, budget: int) -> Embedded:
         depths = _depths(cloths, skin) if skin else {}
         for method, cloth in cloths.items():
             texts: dict[str, str] = {}
-            earlier = embedded.scenes.get(scene)
-            record = earlier or {
+            record = embedded.scenes.get(scene) or {
                 "title": name_scene(scene), "methods": {},
                 "body": _keep(texts, _body(body)) if body else None,
             }  # fmt: skip
             pack = _cloth(cloth, references[scene], depths.get(method), run.metrics)
-            entry = _keep(texts, pack) | {"ending": _ending(cloth)}
+            fine = cloth.status in ("ok", "converged")
+            ending = "" if fine else f"{cloth.status}: {cloth.reason}"
+            entry = _keep(texts, pack) | {"ending": ending}
             new = {name: text for name, text in texts.items() if name not in embedded.texts}
             budget -= sum(ROOM + len(text) for text in new.values())
             if budget < 0:
@@ -185,11 +186,6 @@ def _keep(texts: dict[str, str], pack: Pack) -> dict[str, Any]:
     name = "b" + hashlib.sha256(text.encode()).hexdigest()[:16]
     texts[name] = text
     return {"text": name, "arrays": pack.entries}
-
-
-def _ending(cloth: Trajectory) -> str:
-    """Say how a roll-out ended that did not end well."""
-    return "" if cloth.status in ("ok", "converged") else f"{cloth.status}: {cloth.reason}"
 
 
 def _cloth(

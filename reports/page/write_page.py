@@ -87,10 +87,7 @@ def tables_of(report: Report) -> list[dict[str, Any]]:
 
 def table_data(run: Run, table: Table) -> dict[str, Any]:
     """Return a table as the page's script shows it; the run declares its metrics and methods."""
-    texts = [
-        column_texts(run, column, [row[k] for row in table.rows])
-        for k, column in enumerate(table.columns)
-    ]
+    texts = [column_texts(run, column, cells) for column, cells in zip(table.columns, zip(*table.rows))]
     lines = [list(line) for line in zip(*texts)]
     rows = [[_cell(text, cell) for text, cell in zip(line, row)] for line, row in zip(lines, table.rows)]
     return {

@@ -253,8 +253,7 @@ def _changes(one: Mean, other: Mean, scale: str) -> dict[str, float]:
 
 def _add_noises(one: Mean, other: Mean, scale: str) -> float:
     """Return the noise where single changes are unknown, as between two runs: both add up as independent."""
-    slopes = [_slope(mean, scale) for mean in (one, other)]
-    return math.hypot(*(slope * (mean.uncertainty or 0.0) for slope, mean in zip(slopes, (one, other))))
+    return math.hypot(*(_slope(mean, scale) * (mean.uncertainty or 0.0) for mean in (one, other)))
 
 
 def _slope(mean: Mean, scale: str) -> float:

@@ -222,8 +222,7 @@ def phrase(verdicts: Counter[str]) -> str:
 
 def judge_claims(run: Run) -> list[Judged]:
     """Judge all claims whose two methods ran, primary ones first."""
-    rows = run.garment_rows
-    frame = add_cost(rows[rows["garment"] == run.first_garment])
+    frame = add_cost(run.select_garment(run.first_garment))
     methods = set(frame["method"])
     claims = [claim for claim in CLAIMS if {claim.lower, claim.higher} <= methods]
     compared = [_compare(run, frame, claim) for claim in claims]
@@ -232,10 +231,9 @@ def judge_claims(run: Run) -> list[Judged]:
         for claim, comparison in zip(claims, compared)
     ]
     tested = [claim for claim in PRIMARY if claim.tested]
-    tests = [k for k, claim in enumerate(claims) if claim in tested and p_values[k] is not None]
-    corrected = holm([p for k in tests if (p := p_values[k]) is not None], family=len(tested))
-    for k, p in zip(tests, corrected):
-        p_values[k] = p
+    tests = {k: p for k, p in enumerate(p_values) if claims[k] in tested and p is not None}
+    for k, corrected in zip(tests, holm([*tests.values()], family=len(tested))):
+        p_values[k] = corrected
     lines = []
     for claim, comparison, p in zip(claims, compared, p_values):
         if comparison.effect is not None and comparison.one is not None and comparison.other is not None:

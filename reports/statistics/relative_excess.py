@@ -95,10 +95,10 @@ def add_excess(
             parts.append((place, value, share * uncertainty, moved, worn))
     if not parts:
         return rows
-    excesses = lines.loc[[place for place, *_ in parts]].assign(
-        metric=relative_metric(metric).name, unit="%", value=[value for _, value, *_ in parts],
-        uncertainty=[uncertainty for *_, uncertainty, _, _ in parts],
-        moved=[moved for *_, moved, _ in parts], usable=[worn for *_, worn in parts],
+    places, values, noises, moves, are_worn = map(list, zip(*parts))
+    excesses = lines.loc[places].assign(
+        metric=relative_metric(metric).name, unit="%", value=values, uncertainty=noises,
+        moved=moves, usable=are_worn,
     )  # fmt: skip
     return pd.concat([rows, excesses[rows.columns]], ignore_index=True)
 

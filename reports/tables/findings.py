@@ -78,7 +78,7 @@ def relative_excess(run: Run) -> list[Table]:
     excesses: dict[tuple[str, str], Excess] = {}
     lines: list[tuple[Cell, ...]] = []
     for garment in run.garments(run.garment_rows):
-        rows = add_excess(run, run.garment_rows[run.garment_rows["garment"] == garment])
+        rows = add_excess(run, run.select_garment(garment))
         for method in run.order(set(rows[rows["usable"]]["method"]) - zero):
             if excess := excess_of(run, rows, method):
                 excesses[garment, method] = excess
@@ -142,7 +142,7 @@ def errors_in_spreads(run: Run) -> list[Table]:
     variants = set(run.with_role("reference", "reference-variant"))
     lines: list[tuple[Cell, ...]] = []
     for garment in run.garments(run.garment_rows):
-        rows = run.garment_rows[run.garment_rows["garment"] == garment]
+        rows = run.select_garment(garment)
         for method in run.order(set(rows[rows["usable"]]["method"]) - variants):
             values = [count_spreads(run, rows, method, metric.name) for metric in metrics]
             if any(value is not None for value in values):

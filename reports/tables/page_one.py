@@ -25,13 +25,13 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     over the scenes in which solvers were timed.
     """
     garment = run.first_garment
-    garment_rows = run.garment_rows[run.garment_rows["garment"] == garment]
+    garment_rows = run.select_garment(garment)
     timed, scenes = select_timed(run, garment_rows)
     garment_rows = timed if garment_rows.empty else garment_rows  # of a run of suite speed alone
     plain = set(garment_rows[garment_rows["usable"]]["method"]) - run.find_ablations(garment_rows)
     listed = leads(run, garment_rows)
-    others = [m for m in run.order(plain) if run.methods[m].role in ("network", EXTERNAL)]
-    others += [m for m in run.order(plain) if run.methods[m].role == "baseline"]
+    roles = ("network", EXTERNAL, "baseline")
+    others = [m for role in roles for m in run.order(plain) if run.methods[m].role == role]
     # Of a family of networks the last one: that of the highest level.
     last = {run.methods[m].family: m for m in others}
     listed += [m for m in last.values() if m not in listed]

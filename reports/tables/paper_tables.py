@@ -43,7 +43,7 @@ def _samples(run: Run, methods: Sequence[str], metric: str) -> Mapping[str, pd.S
     """Return set of motions -> evaluated frames of each scene that all the methods have."""
     if run.frame_energies.empty:
         return {}
-    rows = run.garment_rows[run.garment_rows["garment"] == run.first_garment]
+    rows = run.select_garment(run.first_garment)
     frames = run.frame_energies.groupby("scene")["seconds"].nunique()
     frames = frames.reindex(match_scenes(rows, methods, metric)).dropna()
     clips = frames.index.map(lambda scene: recording_of(scene).partition("/")[2])

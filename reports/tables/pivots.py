@@ -98,7 +98,7 @@ def ablation_effects(run: Run) -> list[Table]:
     metrics = [run.metrics[name] for name in COMPARED if name in run.metrics]
     lines: list[tuple[Cell, ...]] = []
     for garment in run.garments(run.garment_rows):
-        rows = run.garment_rows[run.garment_rows["garment"] == garment]
+        rows = run.select_garment(garment)
         for method in run.order(run.find_ablations(rows) & set(rows[rows["usable"]]["method"])):
             base = run.methods[method].base
             effects = [compare_methods(run, rows, metric, method, base).effect for metric in metrics]

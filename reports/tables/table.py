@@ -67,8 +67,6 @@ def duration(seconds: float | None) -> str:
     """
     if seconds is None or not math.isfinite(seconds):
         return DASH
-    if seconds == 0.0:
-        return "0 s"
     for limit, size, unit in ((120.0, 1.0, "s"), (7200.0, 60.0, "min")):
         if abs(seconds) < limit:
             return f"{number(seconds / size)} {unit}"
@@ -175,13 +173,13 @@ class Table:
         for column, cells in zip(self.columns, zip(*self.rows)):
             title = f"{column.name} [{column.unit}]" if column.unit else column.name
             texts[title] = [_csv_text(cell) for cell in cells]
-            if any(isinstance(cell, Mean) for cell in cells):
-                spreads = [cell.spread if isinstance(cell, Mean) else None for cell in cells]
-                texts[f"{column.name}_spread"] = [csv_number(spread) for spread in spreads]
-                moved = [cell.uncertainty if isinstance(cell, Mean) else None for cell in cells]
+            means = [cell if isinstance(cell, Mean) else None for cell in cells]
+            if any(means):
+                texts[f"{column.name}_spread"] = [csv_number(m.spread if m else None) for m in means]
+                moved = [m.uncertainty if m else None for m in means]
                 if any(x is not None for x in moved):
                     texts[f"{column.name}_uncertainty"] = [csv_number(x) for x in moved]
-                missing = [cell.missing if isinstance(cell, Mean) else 0 for cell in cells]
+                missing = [m.missing if m else 0 for m in means]
                 if any(missing):
                     texts[f"{column.name}_lacking"] = [str(count) for count in missing]
             if any(isinstance(cell, Effect) for cell in cells):

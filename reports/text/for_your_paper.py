@@ -51,7 +51,7 @@ def _name_lacking(table: Table, row: tuple[Cell, ...]) -> str:
 
 def paper_table(run: Run) -> Table:
     """Return the methods on the first garment, or in all scenes, with columns that the run has."""
-    rows = run.garment_rows[run.garment_rows["garment"] == run.first_garment]
+    rows = run.select_garment(run.first_garment)
     rows = run.cells() if rows.empty else rows
     omissions = {"", *run.find_ablations(rows), *run.twins, *run.with_role("reference-variant")}
     rows = rows[~rows["method"].isin(omissions)]
