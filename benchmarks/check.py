@@ -1,4 +1,4 @@
-"""python -m benchmarks.check: does a file of your own keep the contract? What is wrong, and the remedy."""
+"""python -m benchmarks.check: does your own file keep the contract? Else the remedy."""
 
 from __future__ import annotations
 
@@ -134,9 +134,10 @@ def faults_of(plan: Plan) -> Iterator[tuple[str, str]]:
         reasons = (o.reason for o in outcomes if o.failed or o.status == "failed")
         fault = next(reasons, "").removeprefix(f"{ContractError.__name__}: ")
         measured = outcomes[2].result if outcomes[2].status == "ok" else {}
-        values = {n: v[0] if isinstance(v, (tuple, list)) else v for n, v in measured.items()}
-        if not fault and (lost := [name for name, value in values.items() if not math.isfinite(value)]):
-            fault = f"{lost[0]} is not finite: leave it out where it does not apply"
+        for name, value in measured.items():
+            number = value[0] if isinstance(value, (tuple, list)) else value
+            if not math.isfinite(number):
+                fault = fault or f"{name} is not finite: leave it out where it does not apply"
         own_scene = cell.scene.declared_in and not cell.entry.declared_in
         name = cell.method if cell.entry.declared_in else "".join(plan.metrics)
         yield cell.scene.name if own_scene else f"{name} in {cell.scene.name}", fault

@@ -1,4 +1,4 @@
-"""Visible tuples of scenes, methods and metrics: each name stands once, each module is loaded when needed."""
+"""Visible tuples of scenes, methods and metrics: names stand once, modules load when needed."""
 
 from __future__ import annotations
 

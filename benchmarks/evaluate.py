@@ -36,7 +36,8 @@ from benchmarks.scene import Scene
 from reference_sim import Potential, Trajectory
 from reference_sim.minimise.lbfgs import LBFGS
 
-WITHOUT_STEP = {"strain", "bending", "gravity", "inertia", "collision"}  # have an energy unprepared too
+# Terms that have an energy before a step is prepared.
+WITHOUT_STEP = {"strain", "bending", "gravity", "inertia", "collision"}
 OLDER = "SNUG or PBNS is of an earlier network of the package; benchmarks.publish references measures it"
 
 
@@ -190,8 +191,7 @@ def _recall_steps() -> Any:
 
 def _recall_scale() -> Any:
     roll_out = _remembered[0]
-    # Where no kernel is compiled yet, this process compiles those of the minimiser while the other one
-    # compiles the search for contact planes.
+    # It compiles the minimiser while the other process compiles the search for contact planes.
     if {term.name for term in roll_out.scene.energies} <= WITHOUT_STEP:
         unprepared = Potential(copy_terms(roll_out.scene))
         unprepared.hessian(roll_out.positions[0])

@@ -143,7 +143,7 @@ def rectangle(
 
 
 def _column(i: int, rows: int) -> np.ndarray:
-    """Return the vertices of one column of the equilateral family, in cells; a shifted one keeps its ends."""
+    """Return one column of vertices of the equilateral family, in cells; a shifted one keeps its ends."""
     y = np.arange(rows + 1.0)
     if i % 2:
         y = np.concatenate([[0.0], np.arange(rows) + 0.5, [float(rows)]])

@@ -1,4 +1,4 @@
-"""python -m benchmarks.publish: run published studies again, all at one commit, and keep what is shown."""
+"""python -m benchmarks.publish: run published studies at one commit; keep what is shown."""
 
 from __future__ import annotations
 

@@ -144,7 +144,7 @@ def write_reference(scene: Scene, plan: Plan, reference: Reference, built: Built
 
 
 def _tree(faces: Faces) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
-    """Return all vertices, each behind a neighbour, and this neighbour of each: both move nearly alike."""
+    """Return all vertices, each behind a neighbour, and this neighbour: both move nearly alike."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import breadth_first_order
 

@@ -1,4 +1,4 @@
-"""Frame of all commands: progress while they work, one line and an exit status for whatever they meet."""
+"""Frame of all commands: progress, and one line and an exit status for whatever they meet."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ class WrongWord(ValueError):
 
 
 class Parser(argparse.ArgumentParser):
-    """Argument parser that answers a wrong or empty word with one line, and leaves examples as they are."""
+    """Argument parser that answers a wrong word with one line and leaves examples as they are."""
 
     def __init__(self, **options: Any) -> None:
         plain = argparse.RawDescriptionHelpFormatter

@@ -1,4 +1,4 @@
-"""Sum of energies that the solver minimises, a network is trained on and every method is measured by."""
+"""Sum of energies that solvers minimise, networks train on and methods are measured by."""
 
 from __future__ import annotations
 
@@ -252,7 +252,7 @@ class Potential:
         return total, gradient
 
     def _check(self, x: np.ndarray) -> np.ndarray:
-        """Return positions as the kernels read them, without bounds; raises ValueError for another shape."""
+        """Return positions for kernels, which look at no bounds. Raises ValueError for another shape."""
         x = np.ascontiguousarray(x, dtype=np.float64)
         if x.shape != (expected := (self.cloth.vertex_count, 3)):
             raise ValueError(f"positions have shape {x.shape}: expected {expected} [m]")

@@ -139,7 +139,7 @@ def choose_pins(choice: str | None, positions: np.ndarray) -> list[int]:
         height = positions[:, 1]
         if height.min() == height.max():
             raise ValueError(
-                "--pins top: the mesh is level, all of it is its top: give --up, or vertices as '0,9'"
+                "--pins top: the mesh is level, all of it is its top: give --up, or vertices"
             )
         return (height >= height.max() - 0.01 * (height.max() - height.min())).nonzero()[0].tolist()
     numbers = [word.strip() for word in choice.split(",")]

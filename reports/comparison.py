@@ -91,13 +91,15 @@ def endings(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
 
 
 def _find_fallen(run: Run, frames: Sequence[pd.DataFrame], basis: pd.DataFrame) -> list[Change]:
-    """Return roll-outs that are worn in one run alone: what fell off has no relative excess to compare."""
+    """Return roll-outs that are worn in one run alone: those that fell off have no excess."""
     excesses = [add_excess(run, frame, basis=basis) for frame in frames]
-    rows = [frame[frame["metric"] == RELATIVE_EXCESS.name] for frame in excesses]
-    status, reason = {True: "ok", False: "failed"}, {True: "", False: "fell off the body"}
-    return endings(
-        *(f.assign(status=f["usable"].map(status), reason=f["usable"].map(reason)) for f in rows)
-    )
+    ends = []
+    for frame in excesses:
+        rows = frame[frame["metric"] == RELATIVE_EXCESS.name].copy()
+        rows["status"] = rows["usable"].map({True: "ok", False: "failed"})
+        rows["reason"] = rows["usable"].map({True: "", False: "fell off the body"})
+        ends.append(rows)
+    return endings(*ends)
 
 
 def _pick_worst(frame: pd.DataFrame) -> pd.DataFrame:
@@ -277,7 +279,8 @@ def _cells(run: Run) -> pd.DataFrame:
         frame[frame["metric"] == name].set_index(CELL[:3])["value"] for name in (TIME, REPEATS)
     )
     timed = frame["metric"].isin((TIME, WHOLE))  # inference alone is repeated, its inputs are not
-    ranges = (inference * repeats / 100.0).reindex(pd.MultiIndex.from_frame(frame.loc[timed, CELL[:3]]))
+    places = pd.MultiIndex.from_frame(frame.loc[timed, CELL[:3]])
+    ranges = (inference * repeats / 100.0).reindex(places)
     frame.loc[timed, "uncertainty"] = ranges.to_numpy()
     # Another run has another reference: uncertainties add up.
     return frame[frame["metric"] != REPEATS].drop(columns="moved")
@@ -341,7 +344,8 @@ def _replace_energies(run: Run, *frames: pd.DataFrame, basis: pd.DataFrame) -> l
     Of energies whose zero is a choice, in scenes whose reference and skinning the basis has.
     """
     shares = []
-    energies = {relative_metric(m.name).name: m.name for m in run.metrics.values() if m.arbitrary_zero}
+    names = [metric.name for metric in run.metrics.values() if metric.arbitrary_zero]
+    energies = {relative_metric(name).name: name for name in names}
     for frame in frames:
         for energy in energies.values():
             frame = add_excess(run, frame, energy, basis=basis)

@@ -54,8 +54,14 @@ def lay_out(report: Report, block: Figure | TableBlock) -> list[Values]:
     if isinstance(block, Figure):
         if not (picture := report.pictures.get(block.name)):
             return []
-        path = f"figures/{picture.path.name}"
-        return [{"kind": "figure", "path": path, "caption": picture.caption, "width": picture.width}]
+        return [
+            {
+                "kind": "figure",
+                "path": f"figures/{picture.path.name}",
+                "caption": picture.caption,
+                "width": picture.width,
+            }
+        ]
     if block.name not in report.tables:
         return []
     table = block.cut_table(report.tables[block.name])

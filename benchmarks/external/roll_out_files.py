@@ -38,7 +38,7 @@ RATE_TOLERANCE = 1e-4  # of a frame rate: people write it with some digits
 
 
 class RollOutFileError(ValueError):
-    """A roll-out that cannot be read or does not belong to the scene; the message names file and remedy."""
+    """A roll-out that is unreadable or not of the scene; the message names file and remedy."""
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Files of a scene: cloth, obstacle, motion and facts, for the export command and for external programs."""
+"""Files of a scene for export and for programs: cloth, obstacle, motion and facts."""
 
 from __future__ import annotations
 

@@ -39,7 +39,7 @@ def measure_triangles(roll_out: RollOut) -> dict[str, float]:
 
 
 def measure_swept(roll_out: RollOut) -> dict[str, float]:
-    """Return the crossings of a step; empty without ipctk, where frames are left out, or of a lost cloth."""
+    """Return the crossings of a step; empty without ipctk, in left-out frames, of a lost cloth."""
     x, scene = roll_out.positions[roll_out.judged], roll_out.scene
     if len(x) < 2 or scene.kept is not None or find_spec("ipctk") is None:
         return {}

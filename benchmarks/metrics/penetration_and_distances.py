@@ -86,7 +86,7 @@ def distance_rms(positions: Positions, reference: Positions) -> Floats:
 
 @dataclass(frozen=True)
 class Penetration:
-    """Penetration per frame, with nothing left out: shares of vertices and of area, and depth (0 outside)."""
+    """Penetration of every frame: shares of vertices and of area, and depth (0 outside)."""
 
     share: Floats  # (T,) of the vertices [1]
     depth: Floats  # (T,V) [m]

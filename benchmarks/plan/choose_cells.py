@@ -26,7 +26,7 @@ PLACES = re.compile(r"\{(motion|swinging)(?: (\d+))?\}")
 
 @dataclass(frozen=True)
 class ReadStudy:
-    """A study with names in place of files, and all that it could ask for, of the project and of the user."""
+    """A study with names in place of files, and all of project and user that it could name."""
 
     study: Study
     inputs: Inputs

@@ -24,8 +24,14 @@ from snug.trained import FOLDER
 PARTS = ("garments", "speed", "validation", "extremes", "shapes")  # that reports know
 
 
-# Fields of sizes that are numbers of things.
-COUNTS = ("garment_vertices", "train_motions", "test_motions", "clip_frames", "sheet_cells", "repeats")
+COUNTS = (  # fields of sizes
+    "garment_vertices",
+    "train_motions",
+    "test_motions",
+    "clip_frames",
+    "sheet_cells",
+    "repeats",
+)
 
 
 class StudyError(ValueError):

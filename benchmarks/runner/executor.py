@@ -1,4 +1,4 @@
-"""Executor of tasks: untimed ones side by side, here or on a cluster; timed ones alone on this machine."""
+"""Executor of tasks: untimed ones side by side, here or on a cluster; timed ones alone here."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class Runner:
         self.outcomes |= dict.fromkeys(ids, refused)
 
     def run(self, executor: Executor) -> None:
-        """Do all tasks: untimed ones side by side until the others wait for timed ones, these one by one."""
+        """Do all tasks: untimed ones side by side until others wait for timed ones, one by one."""
         unknown = [task for task in self.tasks if task.id not in self.outcomes]
         try:
             with Progress(unknown, executor.back_end.slots) as self.progress:

@@ -280,9 +280,13 @@ class Schedule:
         """Return the task that measures a cell, beside those that it is compared with."""
         scene, plan, entry = cell.scene, self.plan, cell.entry
         cells = tuple(other for other in plan.cells if other.scene == scene and runs(other))
-        own = find_own_reference(entry)  # whose energies it is measured by, too
-        compared = (o for o in cells if o.entry.role in COMPARED_WITH or (own and o.method == own.name))
-        reads = tuple(other.id() for other in compared if other != cell)
+        own = find_own_reference(entry)  # ends at the minimum of the network's energies
+        minima = (own.name,) if own else ()
+        reads = tuple(
+            other.id()
+            for other in cells
+            if other != cell and (other.entry.role in COMPARED_WITH or other.method in minima)
+        )
         if scene.simulated:
             reads = (*reads, id_of("start", scene))  # the scene is built from it
         if scene.dynamic:

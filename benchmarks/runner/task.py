@@ -134,7 +134,7 @@ class Task:
 
 
 class RunRefused(ValueError):
-    """The run cannot begin: its folder is another run's, or there is no such cluster; one line says why."""
+    """The run cannot begin: its folder is another run's, or there is no such cluster."""
 
 
 class RunStopped(RuntimeError):

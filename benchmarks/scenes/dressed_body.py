@@ -78,7 +78,11 @@ def build_dressed_body(
 def dress(scene: Scene, dressed: Dressed, **fields: Any) -> BuiltScene:
     """Return the scene of a garment on a moving body, with further fields of BuiltScene."""
     return BuiltScene(
-        name=scene.name, dressed=dressed, origin_heights=dressed.pelvis[:, 1], **_pose(dressed), **fields
+        name=scene.name,
+        dressed=dressed,
+        origin_heights=dressed.pelvis[:, 1],
+        **_pose(dressed),
+        **fields,
     )
 
 

@@ -26,7 +26,7 @@ MIN_FRAMES = 4  # frames: two are not judged, and a mean is of more than one
 
 
 def declare_scene(option: RollOutOption, rest_mesh: str) -> Scene:
-    """Declare the scene of that roll-out. Raises RollOutFileError for an unreadable file, or half a body."""
+    """Declare the scene of a roll-out. Raises RollOutFileError for an unreadable file or half a body."""
     stored = read_roll_out(option.path)
     halves = {"obstacle": stored.obstacle, "obstacle_faces": stored.obstacle_faces}
     gone = [name for name, half in halves.items() if half is None]

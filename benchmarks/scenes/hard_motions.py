@@ -110,7 +110,7 @@ def root_jumps(walk: Motion) -> Motion:
 
 
 def limb_flips(walk: Motion) -> Motion:
-    """Return the walk with the left arm turned by 180 degrees about the chest's front axis for one frame."""
+    """Return the walk with the left arm turned by 180 degrees about the chest's front for a frame."""
     motion, joint = ordinary(walk), JOINT["left_shoulder"]
     poses = motion.poses.copy()
     half = rotation_matrices(np.array([0.0, 0.0, np.pi]))

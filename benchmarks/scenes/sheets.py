@@ -83,7 +83,7 @@ def build_flag(scene: Scene, assets: object = None, *, sheet_cells: int, sheet_f
     cloth = Cloth(positions, faces, Material(), pins=pole)
 
     def handles(frame: int) -> np.ndarray:
-        """Return the pole in a frame, (P,3) [m]: it starts from rest, so that the first frame has no jolt."""
+        """Return the pole in a frame, (P,3) [m]: it starts from rest, so that nothing jolts."""
         phase = 2.0 * np.pi * frame * DT / PERIOD
         swing = SWING * np.sin(phase) * (1.0 - np.cos(min(phase, np.pi))) / 2.0
         return positions[pole] + [0.0, 0.0, swing]

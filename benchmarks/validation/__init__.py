@@ -1,1 +1,1 @@
-"""Validation: known answers and extreme steps. registry.py lists the modules whose functions declare them."""
+"""Known answers and extreme steps. registry.py lists the modules that declare them."""

@@ -23,7 +23,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 @dataclass(frozen=True, kw_only=True)
 class Measurement:
-    """Row of a case that says by itself how it ended: value, status, reason, terms, and what it expected."""
+    """Row of a case that says how it ended: value, status, reason, terms, what it expected."""
 
     value: float | None = None
     status: str = "failed"

@@ -71,7 +71,7 @@ class DeadLoad(energies.Energy):
 
 
 def demand_converged(solved: Solved, name: str) -> Solved:
-    """Return the result itself. Raises RuntimeError with `name`, status and reason unless it converged."""
+    """Return the result. Raises RuntimeError with `name`, status and reason unless it converged."""
     if solved.status != "converged":
         raise RuntimeError(f"{name} ended as {solved.status}: {solved.reason}")
     return solved

@@ -182,7 +182,7 @@ class ContactBarrier(Energy):
 
 
 def _check_heights(cloth: Cloth, distance: float) -> None:
-    """Raise ValueError where a barrier reaches across a triangle: it would push the resting cloth apart."""
+    """Raise ValueError where a barrier reaches across a triangle and pushes the cloth apart."""
     heights = corner_heights(cloth.rest_corners)
     face = int(np.argmin(heights))
     if heights[face] <= distance:

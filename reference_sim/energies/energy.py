@@ -182,7 +182,7 @@ class Energy:
         return 1.0
 
     def search_again(self) -> None:
-        """Forget what was found so far of what is near, as `prepare` does at the beginning of a step."""
+        """Forget what was found near, as `prepare` does at the beginning of a step."""
 
     def predict_stress(self, x: np.ndarray, step: np.ndarray) -> None:
         """Let the Hessian take, until `forget`, the stresses that linear strain predicts at x + step (V, 3).

@@ -1,4 +1,4 @@
-"""Surface of a triangle mesh: normals, contact planes, points carried along by faces, winding numbers."""
+"""Surface of a triangle mesh: normals, contact planes, carried points, winding numbers."""
 
 from __future__ import annotations
 

@@ -1,1 +1,1 @@
-"""Minimisers of a Potential: Newton's method and L-BFGS, with one loop, one call and one type of result."""
+"""Minimisers of a Potential: Newton's method and L-BFGS, with one loop, call and result."""

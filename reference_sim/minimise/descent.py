@@ -1,4 +1,4 @@
-"""Descent, the common part of all minimisers: result, reason to stop, L-BFGS history, line search, loop."""
+"""Common part of all minimisers: result, reason to stop, L-BFGS history, line search, loop."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ LEAST_CURVATURE = 1e-10  # of |s| |y|: pairs of negative curvature would make th
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> float:
-    """Return a . b of two (n,), not by BLAS: its threads cost more than the sum and change its last digit."""
+    """Return a . b of two (n,), not by BLAS, whose threads cost time and change the last digit."""
     return float(np.einsum("i,i", a, b))
 
 

@@ -145,7 +145,7 @@ class LBFGS:
 
 
 class LBFGSRun(Descent):
-    """State of one minimisation by L-BFGS: its history, and the preconditioner factorised at the start."""
+    """State of one minimisation by L-BFGS: history, and preconditioner factorised once."""
 
     def __init__(self, solver: LBFGS, x: np.ndarray) -> None:
         super().__init__(solver.potential, x)
@@ -172,7 +172,7 @@ FLOOR = 1e-4
 
 
 class ScalarPreconditioner:
-    """Scalar stiffness of a potential's terms over the free vertices; one symbolic analysis for all steps."""
+    """Scalar stiffness of a potential over the free vertices; one symbolic analysis for all steps."""
 
     def __init__(self, potential: Potential) -> None:
         free = potential.cloth.free

@@ -94,12 +94,11 @@ class Newton:
             return replace(result, status="diverged", reason=problem)
         if result.status == "converged":
             return result
-        return replace(
-            result, reason=result.reason + _find_collapse(self.potential.cloth, result.positions)
-        )
+        fault = _find_collapse(self.potential.cloth, result.positions)
+        return replace(result, reason=result.reason + fault)
 
     def terminate(self, run: NewtonRun) -> Stop | None:
-        """Let the true Hessian decide where the gradient is small; otherwise assemble the next step's."""
+        """Let the true Hessian decide where the gradient is small; else assemble the next one."""
         spent = run.iterations >= self.max_iterations
         if run.factorisation_serves() and not spent:
             return None
@@ -176,7 +175,7 @@ class NewtonRun(Descent):
         return self.factorised
 
     def first_projection(self) -> int:
-        """Return the level to begin with: wrinkled cloth stays near that of the last step for a while."""
+        """Return the level to begin with: wrinkled cloth stays near that of the last step."""
         return self.projection_level if self.raised else max(self.projection_level - 1, 0)
 
     def factorisation_serves(self) -> bool:
@@ -277,10 +276,11 @@ class NewtonRun(Descent):
 
 
 def _find_collapse(cloth: Cloth, x: np.ndarray) -> str:
-    """Name the face that is a line at x (V, 3) [m], where bending has no derivative; empty if none is."""
+    """Name the face that is a line at x (V, 3) [m]: bending has no derivative there. Empty for none."""
     heights = corner_heights(x[cloth.faces])
     face = int(np.argmin(heights))
     if not heights[face] <= COLLAPSED:  # nor is one that is not finite
         return ""
     at_rest = corner_heights(cloth.rest_corners)[face]
-    return f": face {face}, {at_rest:.2g} m high at rest, has become a line; use a mesh without slivers"
+    fault = f": face {face}, {at_rest:.2g} m high at rest, has become a line"
+    return f"{fault}; use a mesh without slivers"

@@ -103,8 +103,11 @@ def _column(run: Run, column: Column) -> dict[str, Any]:
     if better is not None:
         definition += f"; {'lower' if better else 'higher'} is better"
     return {
-        "title": column.title, "unit": column.unit_above, "words": column.text, "definition": definition,
-    }  # fmt: skip
+        "title": column.title,
+        "unit": column.unit_above,
+        "words": column.text,
+        "definition": definition,
+    }
 
 
 def _cell(text: dict[str, str], cell: Cell) -> str | list[Any]:

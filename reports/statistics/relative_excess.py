@@ -78,7 +78,9 @@ def add_excess(
     sound = basis[(basis["status"] == "ok") | ~basis["method"].isin(run.reference_family)]
     zeros = _values(sound, metric, [run.reference, *run.reference_family])
     totals = _values(sound, TOTAL, [run.reference, *run.reference_family, SKINNING])
-    lines, wholes = (rows[(rows["metric"] == name) & rows["usable"]] for name in (metric, TOTAL))
+    sound_rows = rows[rows["usable"]]
+    lines = sound_rows[sound_rows["metric"] == metric]
+    wholes = sound_rows[sound_rows["metric"] == TOTAL]
     whole = wholes.set_index(["scene", "method", "seed"])["value"].to_dict()
     parts = []
     columns = (lines[name].tolist() for name in ("scene", "method", "seed", "value", "uncertainty"))

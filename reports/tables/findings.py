@@ -163,11 +163,16 @@ def validation(run: Run) -> list[Table]:
     """
     lines = [
         (
-            row.case or f"{row.scene}: {run.metrics[row.metric].title}", row.unit, row.value, row.expected,
-            row.tolerance, tolerances_away(row), _result(row),
+            row.case or f"{row.scene}: {run.metrics[row.metric].title}",
+            row.unit,
+            row.value,
+            row.expected,
+            row.tolerance,
+            tolerances_away(row),
+            _result(row),
         )
         for row in checks(run).itertuples()
-    ]  # fmt: skip
+    ]
     columns = (
         Column("check", "Check", text=True),
         Column("unit", "Unit", text=True),

@@ -36,7 +36,8 @@ def write_paper_table(folder: RunFolder, run: Run) -> Table:
     """Write for_your_paper.csv, in each row what it marks and the caption, and .tex; return the table."""
     table = paper_table(run)
     rows = tuple((*row, _name_lacking(table, row) or None, table.caption) for row in table.rows)
-    columns = (*table.columns, *(Column(name, name, text=True) for name in ("lacking", "caption")))
+    further = (Column(name, name, text=True) for name in ("lacking", "caption"))
+    columns = (*table.columns, *further)
     replace(table, columns=columns, rows=rows).drop_empty().write_csv(folder.path)
     with replacing(folder.path / f"{NAME}.tex") as temporary:
         temporary.write_text(latex_table(run, table), encoding="utf-8", newline="\n")
@@ -45,8 +46,11 @@ def write_paper_table(folder: RunFolder, run: Run) -> Table:
 
 def _name_lacking(table: Table, row: tuple[Cell, ...]) -> str:
     """Return the columns in which a row's mean is over fewer scenes or seeds than it should be."""
-    cells = {column.name: cell for column, cell in zip(table.columns, row)}
-    return ", ".join(k for k, cell in cells.items() if isinstance(cell, Effect) and not cell.complete)
+    names = []
+    for column, cell in zip(table.columns, row):
+        if isinstance(cell, Effect) and not cell.complete:
+            names.append(column.name)
+    return ", ".join(names)
 
 
 def paper_table(run: Run) -> Table:

@@ -47,7 +47,7 @@ LEG_LENGTH = float(np.linalg.norm(np.diff(REST_JOINTS[[1, 4, 7]], axis=0), axis=
 
 
 class BodyError(ValueError):
-    """A body file, or an argument for a body, that cannot be used; the message names problem and remedy."""
+    """A file of a body, or an argument, that cannot be used; the message has the remedy."""
 
 
 def rotation_matrices(axis_angles: np.ndarray) -> np.ndarray:

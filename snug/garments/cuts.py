@@ -1,4 +1,4 @@
-"""Cuts through a garment's surface: where it ends, and the dense sheet with named outlines between them."""
+"""Cuts through a garment's surface, and the dense sheet with named outlines between them."""
 
 from dataclasses import dataclass, replace
 from itertools import pairwise

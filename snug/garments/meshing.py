@@ -74,7 +74,7 @@ def delaunay_flips(points: Array, faces: Index, *, passes: int = 3) -> Index:
 def relax(
     points: Array, faces: Index, held: NDArray[np.bool_], surface: ImplicitSurface
 ) -> tuple[Array, Index]:
-    """Move vertices along the surface towards larger triangles, and flip edges; `held` (V,) vertices stay."""
+    """Move vertices along the surface towards larger triangles, flip edges; `held` (V,) stay."""
     points = points.copy()
     for _ in range(RELAXATIONS):
         faces = delaunay_flips(points, faces, passes=1)

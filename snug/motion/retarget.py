@@ -180,7 +180,7 @@ def _side(name: str) -> tuple[str, str]:
 
 
 def _trunk(names: Sequence[str], parents: Sequence[int], matches: Mapping[str, int]) -> dict[str, int]:
-    """Match pelvis, spine, neck and head by their places; the spine may have one or any number of joints."""
+    """Match pelvis, spine, neck and head by place; the spine may have any number of joints."""
     pelvis = _meet(parents, matches["left_hip"], matches["right_hip"])
     chest = _meet(parents, matches["left_shoulder"], matches["right_shoulder"])
     head = next((index for index, name in enumerate(names) if _side(name)[1].endswith("head")), None)

@@ -152,7 +152,7 @@ def _trajectory(
 
 
 class CompiledFrame:
-    """A compiled call that skins an unposed garment (V, 3) [m] by weights (V, J), with a network or none."""
+    """A compiled call that skins an unposed garment (V, 3) [m] by weights (V, J)."""
 
     def __init__(self, rest: Tensor, weights: Tensor, network: GarmentNetwork | None = None) -> None:
         order, *joints = blocks_of_vertices(weights.numpy())

@@ -61,8 +61,8 @@ class FrequencyMixture(GarmentNetwork):
         normalised = self.normalise(features)
         drop = [None, None] if masks is None else list(masks)
         flat = self.low(normalised, drop[0]), self.high(normalised[..., :-SHAPES], drop[1])
-        low, high = ((self.output_scale * band).unflatten(-1, (self.vertices, 3)) for band in flat)
-        return low, high
+        low, high = (band.unflatten(-1, (self.vertices, 3)) for band in flat)
+        return self.output_scale * low, self.output_scale * high
 
     def forward(self, features: Tensor, state: Tensor | None = None) -> tuple[Tensor, None]:
         """Return offsets (N, T, V, 3) [m] and no state."""

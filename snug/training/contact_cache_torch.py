@@ -137,7 +137,8 @@ class TensorContactCache:
         s, t, r = b - a, c - a, points[:, None] - a
         v, w = closest_on_triangle(s, t, r)
         squared = (r - v[..., None] * s - w[..., None] * t).square().sum(-1)
-        outside = (self.centroids[some] - home[:, None]).square().sum(-1) >= self.patch.region**2
+        away = (self.centroids[some] - home[:, None]).square().sum(-1)
+        outside = away >= self.patch.region**2
         squared = torch.where(faces < 0, torch.inf, squared + FORBIDDEN * outside)
         best = squared.argmin(1, keepdim=True)
         pick = [table.gather(1, best)[:, 0] for table in (faces, v, w)]

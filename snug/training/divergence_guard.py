@@ -32,7 +32,7 @@ FACTS = ("rate", "summary", "usual", "good_step", "bad_in_a_row", "skipped_in_a_
 
 
 class DivergenceGuard:
-    """A verdict on each batch before its update. spike: see Recipe [J]; None where the loss is no energy."""
+    """A verdict on each batch before its update. spike: see Recipe [J]; None for a loss in other units."""
 
     def __init__(self, network: nn.Module, optimiser: optim.Optimizer, *, spike: float | None) -> None:
         self.network, self.optimiser, self.spike = network, optimiser, spike

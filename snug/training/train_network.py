@@ -77,7 +77,8 @@ class TrainingLoop:
         last = self.done == self.trainer.steps
         if len(self.recent) == self.every or last:
             row = {"step": self.done, "seconds": self.elapsed}
-            row |= {name: float(np.mean([r[name] for r in self.recent])) for name in self.recent[0]}
+            for name in self.recent[0]:
+                row[name] = float(np.mean([step[name] for step in self.recent]))
             self.recent = []
             self.history.append(row)
             bar.set_postfix(loss=f"{row['loss']:.4g}", refresh=False)
