@@ -133,7 +133,7 @@ def read_fabrics(path: Path) -> tuple[Fabric, ...]:
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise DeclarationError(f"{path}: cannot be read ({error}): give a CSV file") from None
     columns: dict[str, tuple[int, float]] = {}
-    for place, head in enumerate(re.sub(r"\s", "", head) for head in (lines[0] if lines else ())):
+    for place, head in enumerate(re.sub(r"[\s\ufeff]", "", head) for head in (lines[0] if lines else ())):
         if head in HEADS:
             field, unit = HEADS[head]
             if field in columns:
