@@ -109,7 +109,7 @@ def as_before():
     yield
     sys.path[:] = path
     for name in set(sys.modules) - modules:
-        file = getattr(sys.modules[name], "__file__", None) or ""
+        file = getattr(sys.modules[name], "__file__", None) or sys.prefix  # of torch, written in C
         if not file.startswith((str(Path(run.__file__).parent.parent), sys.prefix, sys.base_prefix)):
             del sys.modules[name]
     metrics.list_metrics.cache_clear()
