@@ -117,7 +117,7 @@ def plan_of(path: str, study: Study, folder: Path) -> Plan:
 
 
 def faults_of(plan: Plan) -> Iterator[tuple[str, str]]:
-    """Run a plan by the ordinary runner; yield each entry in each scene, and what is wrong with it, or ""."""
+    """Run a plan by the ordinary runner; yield each entry in each scene, and its fault, or ""."""
     skipped = {cell: cell.entry.skip(cell.scene) for cell in plan.cells}
     cells = tuple(cell for cell in plan.cells if not skipped[cell])
     for cell in {cell.method: cell for cell in plan.cells}.values():

@@ -122,7 +122,8 @@ def _run_scene(
             outcomes[id_of("quasi-static", scene)] = solved
         else:
             print(f"{scene.name}: quasi-static solutions: {solved.ending}", file=sys.stderr)
-    context.memo["roll-outs"] = roll_outs_of(cells, plan.study.sizes.gap_samples, context, outcomes)
+    samples = plan.study.sizes.gap_samples
+    context.memo["roll-outs"] = roll_outs_of(cells, samples, context, outcomes)
     for cell in cells:
         if reference and cell.method in metrics:
             usual = Outcome(files=(cell.name,), result={"terms": "+".join(context.memo["scene"].terms)})
@@ -131,13 +132,7 @@ def _run_scene(
         elif outcomes[cell.id()].files:
             with _steps_beside(context.memo["roll-outs"][cell]):
                 measured[cell.id("metrics")] = _attempt(
-                    measure_cell,
-                    cell,
-                    cells,
-                    plan.study.sizes.gap_samples,
-                    plan.metrics,
-                    context,
-                    outcomes,
+                    measure_cell, cell, cells, samples, plan.metrics, context, outcomes
                 )
     return outcomes | measured
 

@@ -194,7 +194,7 @@ def find_module(module: str) -> str:
 
 
 def find_imports(home: str) -> dict[str, Path]:
-    """Return name -> file of the modules and packages beside a user's file that it or one of them imports."""
+    """Return name -> file of modules and packages beside a user's file that it or they import."""
     top, names = _top_of(Path(home)), set[str]()
     for path in _neighbours(Path(home)):
         with suppress(SyntaxError, ValueError):  # it is not imported: what is was loaded

@@ -94,7 +94,7 @@ class Scene:
         return replace(self, sizes=(), options={**sizes, **self.options})
 
     def build(self, assets: Assets | None = None) -> BuiltScene:
-        """Build everything that the scene declares. Deterministic. Raises ValueError for missing assets."""
+        """Build what the scene declares. Deterministic. Raises ValueError for missing assets."""
         if self.dressed and assets is None:
             raise ValueError(f"scene {self.name} needs assets: a body, a garment and the motion")
         return load_function(self.module, "build")(self, assets, **self.options)

@@ -71,7 +71,7 @@ def parse_options(arguments: Sequence[str] | None = None) -> argparse.Namespace:
 
 
 def check_options(options: argparse.Namespace) -> None:
-    """Raise ValueError for an option that lacks another, or a file that cannot be written."""
+    """Raise ValueError for an option that needs another, or a file that cannot be written."""
     if options.dataset and options.motions:
         raise ValueError(f"--dataset {options.dataset}: has motions of its own; leave out --motions")
     simulated = not KINDS[options.model].physics

@@ -104,7 +104,7 @@ class Network(Method):
         return replace(rolled, provenance=rolled.provenance | facts)
 
     def inputs(self, scene: BuiltScene) -> Callable[[int], object]:
-        """Return a function of the frame that makes features, joint transforms, and the body to clean by."""
+        """Return a function of the frame: features, joint transforms, and the body to clean by."""
         assert scene.dressed is not None
         features = prepare_frame_inputs(
             self.model, self.dressed, self.motion, self.betas, earlier=scene.dressed.before

@@ -37,7 +37,7 @@ from reference_sim.trajectory import Trajectory
 
 @dataclass
 class Stored(Method):
-    """Positions of a file, once they have been shown to belong to the scene; stated: of a RollOutOption."""
+    """Positions of a file, shown to belong to the scene; stated: of a RollOutOption."""
 
     path: str
     stated: dict[str, Any] = field(default_factory=dict)

@@ -100,7 +100,7 @@ def block(x, v, inertia, terms, g, H, scratch, out):
 
 @njit(cache=True, inline="always", error_model="numpy")
 def _newton(x, v, g, H):
-    """Subtract H^-1 g, by the adjugate, from x_v; H is positive definite, for a mass is on its diagonal."""
+    """Subtract H^-1 g, by the adjugate, from x_v; H is positive definite, by its masses."""
     c0 = H[1, 1] * H[2, 2] - H[1, 2] * H[2, 1]
     c1 = H[1, 2] * H[2, 0] - H[1, 0] * H[2, 2]
     c2 = H[1, 0] * H[2, 1] - H[1, 1] * H[2, 0]

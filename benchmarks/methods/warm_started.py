@@ -111,7 +111,7 @@ class WarmStarted(Simulation):
     of_guess: Callable[[int], object] = field(init=False)
 
     def prepare(self, scene: BuiltScene) -> None:
-        """Prepare frames and solver. Raises ValueError for several steps a frame: one alone has a start."""
+        """Prepare frames and solver. Raises ValueError for several steps a frame."""
         if scene.substeps > 1:
             raise ValueError(f"scene {scene.name} has {scene.substeps} steps a frame, starts are of one")
         guess = make_guess(self._frames(scene), self._carry(scene) if self.residual else None)

@@ -39,7 +39,7 @@ FLAT = 1e-6  # spread of H times the cloth's length: less is round-off
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
-    """Return mean curvature and change of wrinkles over the evaluated frames; empty without an interior."""
+    """Return mean curvature and change of wrinkles over evaluated frames; empty without interior."""
     part = roll_out.get(series_of).part(roll_out.judged)
     if not part.area.any():
         return {}

@@ -35,12 +35,8 @@ SHIFTING = 5e-3  # [m] rms static displacement below which there is nothing to b
 MAX_LAG = 12.0  # frames
 SHORTEST = 8  # frames of which a motion can be said
 NO_MOTION = 1e-6  # [m] rms of a dynamic part that is none
-HEM = (
-    ("correlation", "Hem correlation"),
-    ("amplitude", "Hem amplitude"),
-    ("gain", "Gain"),
-    ("lag", "Lag"),
-)
+TITLES = ("Hem correlation", "Hem amplitude", "Gain", "Lag")
+HEM = tuple(zip(("correlation", "amplitude", "gain", "lag"), TITLES))
 
 
 def dynamic_part(moving: Array, static: Array) -> Array:
@@ -188,7 +184,7 @@ def shares_quasi_static(entry: MethodEntry) -> bool:
 
 
 def hem_motion(reference: RollOut) -> HemMotion | None:
-    """Return the frame of reference of the scene's hems; None without a body or a quasi-static solution."""
+    """Return the frame of reference of the scene's hems; None without body or quasi-static solution."""
     group, dressed = reference.group, reference.scene.dressed
     if dressed is None or group.quasi_static is None:
         return None

@@ -60,7 +60,7 @@ def measure(roll_out: RollOut) -> dict[str, float | Estimate]:
 
 
 def series(roll_out: RollOut) -> dict[str, NDArray[np.float32]]:
-    """Return step/vertices (T,V) [mm]: distance of each vertex to y_t; nan in other than sampled frames."""
+    """Return step/vertices (T,V) [mm]: distance of vertices to y_t; nan but in sampled frames."""
     away = roll_out.get(judge_steps).away
     values = np.full(roll_out.positions.shape[:2], np.nan, dtype=np.float32)
     for frame, distances in away.items():

@@ -54,7 +54,7 @@ def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
 
 
 def _find_minimum(roll_out: RollOut, recipe: Recipe) -> Positions | None:
-    """Return the minimiser (T,V,3) [m] of these energies; None where no simulation of them has ended well."""
+    """Return the minimiser (T,V,3) [m] of these energies; None where no simulation ended well."""
     if recipe == STATIC:
         static = roll_out.group.quasi_static  # of a shipped reference, known at the hem alone
         return static if static is not None and np.isfinite(static).all() else None

@@ -50,7 +50,7 @@ def measure(roll_out: RollOut) -> dict[str, float]:
 
 
 def inside_of(roll_out: RollOut) -> Penetration:
-    """Return the penetration of a roll-out; that of all roll-outs of the scene's mesh is computed at once."""
+    """Return the penetration of a roll-out; that of all of the scene's mesh is computed at once."""
     group = roll_out.group
     return (group.get(_measure) if roll_out in group.roll_outs else _inside([roll_out]))[roll_out]
 

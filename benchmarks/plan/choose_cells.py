@@ -199,7 +199,7 @@ def _check_user_scenes(scenes: Sequence[Scene], motions: Motions) -> None:
     for scene in (scene for scene in scenes if scene.declared_in):
         for field, names in (("start_of", settling), ("motion", [*motions.files, *LIBRARY])):
             needed = scene.dressed and field == "motion"
-            if (word := getattr(scene, field)) not in (*[""] * (not needed), *names):
+            if (word := getattr(scene, field)) not in names and (word or needed):
                 place = f"{scene.declared_in}: scene '{scene.name}': {field}='{word}'"
                 raise StudyError(f"{place}: nothing that serves is called so; {nearest(word, names)}")
 

@@ -117,13 +117,13 @@ def _tables(options: argparse.Namespace) -> Iterator[Table]:
         elif field == "motions":
             paths = list(map(split_words, value))
             value = [path for path, _ in paths]
-            words = [table for path, table in paths if path != LIBRARY] or [{}]
-            if any(table != words[0] for table in words):
+            tables = [table for path, table in paths if path != LIBRARY] or [{}]
+            if any(table != tables[0] for table in tables):
                 raise StudyError(
                     "motions: words behind a path hold for all files: give each path the same"
                 )
-            if words[0]:
-                yield option("motion_files", words[0])
+            if tables[0]:
+                yield option("motion_files", tables[0])
         elif field == "rollouts":
             value = dict(map(parse_roll_out, value))
         elif field not in SINGLE:

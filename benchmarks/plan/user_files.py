@@ -27,7 +27,7 @@ NAME = re.compile(r"(?!body$|.*quasi-static$)[A-Za-z0-9_][A-Za-z0-9_+./@:-]{0,14
 
 
 class Kind(NamedTuple):
-    """A kind of declaration: its field in a study, tuple, entries, and the function that stands beside."""
+    """A kind of declaration: field of a study, tuple, entries, function that stands beside."""
 
     word: str
     tuple_name: str

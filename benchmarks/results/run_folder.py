@@ -52,7 +52,7 @@ class RunFolder:
         self.trajectories, self.cache = folder / "trajectories", folder / "cache"
 
     def models_of(self, garment: str) -> Path:
-        """Return the folder of networks of that garment: of the T-shirt, the usual one, `models` itself."""
+        """Return the folder of networks of that garment: of the T-shirt `models` itself."""
         return self.models if garment in ("", "tshirt") else self.models / garment
 
     def relative(self, path: Path) -> str:

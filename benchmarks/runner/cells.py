@@ -82,6 +82,8 @@ def files_of(cell: Cell, folder: RunFolder) -> tuple[str, ...]:
 
 def compute_cell(cell: Cell, min_time: float, context: Context) -> Outcome:
     """Prepare off the clock, run on it, write the trajectory; memory is that until the run has ended."""
+    import numpy as np
+
     folder = context.folder
     scene, method = build_scene(cell.scene, context), prepare_method(cell, context)
     if cell.timed:
@@ -114,8 +116,6 @@ def compute_cell(cell: Cell, min_time: float, context: Context) -> Outcome:
     paths = [folder.trajectory_path(*cell.key)]
     provenance = {"run_seconds": reading.seconds, "scene": scene.name, "seed": cell.seed}
     replace(trajectory, provenance=trajectory.provenance | provenance).save(paths[0])
-    import numpy as np
-
     quasi_static = method.quasi_static() if cell.scene.dynamic or not cell.scene.dressed else None
     if quasi_static is not None:
         if fault := misshapen(quasi_static.positions, scene):
@@ -193,7 +193,7 @@ def judge(
     truncated: bool,
     other_mesh: bool = False,
 ) -> tuple[str, str]:
-    """Status and reason of a row, from what the trajectory says of itself, what is in it, and the clock."""
+    """Return status and reason of a row, by what the trajectory says and holds, and the clock."""
     import numpy as np
 
     reason = " ".join(trajectory.reason.split())

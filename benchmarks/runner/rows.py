@@ -37,7 +37,7 @@ def rows_of(plan: Plan, tasks: Sequence[Task], outcomes: Outcomes) -> list[Row]:
 def rows_of_cell(
     cell: Cell, plan: Plan, tasks: Mapping[TaskId, Task], outcomes: Outcomes
 ) -> Iterator[Row]:
-    """Yield the rows of a cell in each of its suites; a cell without metrics is one row with its reason."""
+    """Yield the rows of a cell in each of its suites; one without metrics is a row with its reason."""
     outcome = outcomes.get(cell.id())
     if outcome is None:
         return

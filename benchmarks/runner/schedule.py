@@ -280,8 +280,8 @@ class Schedule:
         """Return the task that measures a cell, beside those that it is compared with."""
         scene, plan, entry = cell.scene, self.plan, cell.entry
         cells = tuple(other for other in plan.cells if other.scene == scene and runs(other))
-        own = find_own_reference(entry)  # ends at the minimum of the network's energies
-        minima = (own.name,) if own else ()
+        reference = find_own_reference(entry)  # ends at the minimum of the network's energies
+        minima = (reference.name,) if reference else ()
         reads = tuple(
             other.id()
             for other in cells

@@ -85,7 +85,7 @@ def another_faster(walk: Motion, times: int, other: str) -> Motion:
 
 
 def posed(walk: Motion, degrees: Mapping[str, tuple[float, float, float]]) -> Motion:
-    """Return a way into the walk's first pose with some joints at other angles, and STILL frames there."""
+    """Return a way into the walk's first pose with some joints turned, and STILL frames there."""
     pose = walk.poses[0].copy()
     for joint, angles in degrees.items():
         pose[JOINT[joint]] = np.deg2rad(angles)

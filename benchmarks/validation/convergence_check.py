@@ -27,7 +27,7 @@ STATUS = {"converged": "ok", "max_iterations": "stalled"}
 
 
 def solve_and_check(potential: sim.Potential, guess: np.ndarray) -> Measurement:
-    """Minimise a prepared potential from `guess` (V, 3) [m] as the simulator does, and check the result."""
+    """Minimise a prepared potential from `guess` (V, 3) [m] as the simulator does; check the end."""
     result = sim.minimise(potential, guess, method="lbfgs", tolerance=RELATIVE_RESIDUAL, timeout=TIMEOUT)
     return check_result(potential, guess, result)
 

@@ -106,7 +106,7 @@ def order(error: Callable[[int], float], counts: Sequence[int], whole: float = 1
 
 
 def fit_order(errors: Sequence[float], sizes: Sequence[float]) -> float:
-    """Return the slope of log error over log size by least squares; nan for errors of zero or not finite."""
+    """Return the slope of log error over log size by least squares; nan unless errors are above 0."""
     if not (np.isfinite(errors).all() and np.min(errors) > 0):
         return float("nan")
     return float(np.polyfit(np.log(sizes), np.log(errors), 1)[0])

@@ -54,7 +54,7 @@ def slope_path(ratio: float) -> float:
 
 @PATH({"friction_slide": {"ratio": 1.2}})
 def slide_path(ratio: float) -> float:
-    """Return the worst distance of a patch on a slope to the path of the constant g (sin a - mu cos a)."""
+    """Return the worst distance of a patch on a slope to the path of constant g (sin a - mu cos a)."""
     (slid, c, s), n = _slide(ratio), np.arange(31)
     exact = sim.GRAVITY * (s - MU * c) * DT**2 * n * (n + 1) / 2
     return float(np.abs(slid - exact).max())

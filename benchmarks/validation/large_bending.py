@@ -125,7 +125,7 @@ def exact_catenary() -> dict[str, float]:
 @known_answer(["catenary_sag"], unit="m", tolerance=1e-4, reason="second order in 1/48 of the length")
 @cache
 def catenary() -> dict[str, tuple[float, float]]:
-    """Return the horizontal force per width, or the sag, of an elastic catenary, 1 m over a span of 0.8 m."""
+    """Return horizontal force per width, or sag, of an elastic catenary, 1 m over a span of 0.8 m."""
     measured, exact = _catenary(STRING_CELLS[-1]), exact_catenary()
     return {f"catenary_{name}": (measured[name], exact[name]) for name in exact}
 

@@ -120,7 +120,7 @@ def weight_of_a_square_metre() -> float:
 )  # fmt: skip
 @cache
 def scikit_fem() -> dict[str, float]:
-    """Return the relative difference to scikit-fem's energy, gradient and Hessian, in a random 3D state."""
+    """Return the relative difference to scikit-fem's energy, gradient, Hessian in a random state."""
     import skfem
 
     @skfem.Functional

@@ -64,7 +64,7 @@ def pendulum() -> float:
     expected=1.0, tolerance=0.1, reason="backward Euler; its second order still shows at 1/480 s"
 )
 def time_step_order() -> float:
-    """Return the order in dt of the pendulum's place after half a second; scipy integrates the reference."""
+    """Return the order in dt of the pendulum's place after half a second, against scipy."""
     from scipy.integrate import solve_ivp
 
     start, end = np.array([0.52, 0.1]), 0.5

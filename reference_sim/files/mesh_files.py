@@ -219,10 +219,10 @@ def join_seams(surface: Surface, distance: float = JOIN_DISTANCE) -> Surface:
     place = np.empty(count, dtype=np.int64)
     place[of_vertex[ids]] = np.arange(len(ids))
     faces = place[of_vertex][surface.faces]
-    if (lost := (faces == np.roll(faces, 1, axis=1)).any(axis=1)).any():
+    if (collapsed := (faces == np.roll(faces, 1, axis=1)).any(axis=1)).any():
         raise MeshError(
-            f"joining vertices within {distance:g} m makes a line of triangle {lost.argmax()}: weld by less, "
-            "or remove the triangle"
+            f"joining vertices within {distance:g} m makes a line of triangle {collapsed.argmax()}: "
+            "weld by less, or remove the triangle"
         )
     return replace(surface, positions=surface.positions[ids], faces=faces)
 

@@ -92,8 +92,11 @@ def add_excess(
             # The reference is zero by definition, whichever simulation it is.
             moved = () if method == run.reference else tuple((k, v - value) for k, v in shares.items())
             share = 100.0 / (total[SKINNING] - total[run.reference])
-            own = whole.get((scene, method, seed))
-            worn = (value if own is None else share * (own - total[run.reference])) >= LEAST
+            energy_of_cell = whole.get((scene, method, seed))
+            if energy_of_cell is None:
+                worn = value >= LEAST
+            else:
+                worn = share * (energy_of_cell - total[run.reference]) >= LEAST
             parts.append((place, value, share * uncertainty, moved, worn))
     if not parts:
         return rows

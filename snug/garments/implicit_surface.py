@@ -47,7 +47,7 @@ CROTCH_BONES = ("pelvis", "left_hip", "right_hip")
 
 
 def skin_following(body: Body, names: Sequence[str]) -> NDArray[np.bool_]:
-    """Return which body vertices (B,) have one of the joints `names` as their strongest skinning weight."""
+    """Return which body vertices (B,) have one of the joints `names` as their strongest weight."""
     joints = [JOINT[name] for name in names]
     return np.isin(np.argmax(body.skinning_weights, axis=1), joints)
 

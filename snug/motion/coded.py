@@ -304,7 +304,7 @@ MADE: dict[str, tuple[str, str, Callable[[], Frames]]] = {  # kind, source, func
 
 
 def make_clip(name: str) -> Motion:
-    """Make the library's motion of that name, arms as in its tables. Raises KeyError for an unknown name."""
+    """Make the library's motion of that name, arms as in its tables. Raises KeyError."""
     kind, source, make = MADE[name]
     poses, path = make()
     if name not in STOPS:

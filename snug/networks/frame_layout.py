@@ -120,7 +120,7 @@ class FramePlan:
                 self._terms.append(np.ascontiguousarray(part[:, handle].T).ravel())
 
     def _place(self, size: int) -> slice:
-        """Reserve a place for `size` numbers; those behind stay zero: matrices are read in whole vectors."""
+        """Reserve a place for `size` numbers; those behind stay zero, read in whole vectors."""
         start = self._used
         self._used += _up(size + ROWS, COLUMNS)
         return slice(start, start + size)

@@ -251,7 +251,7 @@ class TrainingContact:
         self._changed[:] = False  # a resumed run makes these anchors again
 
     def requery(self, frames: np.ndarray, posed: Posed, x: Tensor) -> None:
-        """Search a few of the windows (N, T) with vertices (N, T, V, 3) anew, those searched longest ago."""
+        """Search some windows (N, T) with vertices (N, T, V, 3) anew, those searched longest ago."""
         self._credit += REFRESH * frames.size
         count = int(self._credit)
         self._credit -= count

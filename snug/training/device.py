@@ -1,4 +1,4 @@
-"""Devices that networks train on, `cpu` and `cuda`, and fast small operations on a GPU."""
+"""Devices that networks train on, and what makes small operations fast on a GPU."""
 
 from __future__ import annotations
 

@@ -143,8 +143,8 @@ class TrainingSet:
         batch = replace(self.gather(rows, shapes), frames=frames)
         if betas is not None or self.shapes is None:
             return batch
-        own = self.shapes[self.motion_of(frames[:, 0])]
-        return self._dress(batch, torch.as_tensor(own, device=self.device))
+        drawn = self.shapes[self.motion_of(frames[:, 0])]
+        return self._dress(batch, torch.as_tensor(drawn, device=self.device))
 
     def gather(self, rows: Tensor, betas: Tensor | None = None) -> Batch:
         """Return rows (N, T) on the device, each line on the mean body or that of shape numbers (N, S).

@@ -123,9 +123,9 @@ def test_a_shipped_reference_gives_the_numbers_of_a_fresh_simulation(tmp_path, m
         score.score(tmp_path / "mine.npz", name, study=longer, folder=tmp_path / "other")["status"]
         == "ok"
     )
-    said = capsys.readouterr().err  # what needs no simulation is kept
+    error = capsys.readouterr().err  # what needs no simulation is kept
     assert (
-        "none is shipped for this scene" in said and "quasi-static solutions: failed: TypeError" in said
+        "none is shipped for this scene" in error and "quasi-static solutions: failed: TypeError" in error
     )
 
 

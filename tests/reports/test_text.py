@@ -130,8 +130,8 @@ def test_a_mean_that_lacks_roll_outs_has_a_mark_and_the_mark_its_meaning(tmp_pat
     assert "| 4.0* |" in text and re.search(r"\| 1\d\* \|", text) and text.endswith(REMARKS["*"])
     tex = (tmp_path / "for_your_paper.tex").read_text(encoding="utf-8")
     assert "& 4.0* &" in tex and REMARKS["*"] in tex
-    lacking = pd.read_csv(tmp_path / "for_your_paper.csv")["lacking"]
-    assert list(lacking) == ["-", "penetration/surface", "relative_excess"]
+    marks = pd.read_csv(tmp_path / "for_your_paper.csv")["lacking"]
+    assert list(marks) == ["-", "penetration/surface", "relative_excess"]
 
 
 def test_the_latex_of_the_table_for_a_paper_is_sound_whatever_names_hold(tmp_path):

@@ -52,7 +52,7 @@ def test_what_is_measured_in_a_scene_is_no_part_of_its_cells(plan):
 
 
 def test_a_network_is_measured_beside_the_minimum_of_its_own_energies_whatever_its_batch(plan):
-    own = find_own_reference(find_method("snug-no-gravity"))
-    cells = [Cell(KICK, entry, 0, ("garments",)) for entry in (find_method("snug-no-gravity"), own)]
+    network = find_method("snug-no-gravity")
+    cells = [Cell(KICK, e, 0, ("garments",)) for e in (network, find_own_reference(network))]
     tasks = {task.id: task for task in tasks_of(dataclasses.replace(plan, cells=(*CELLS, *cells)))}
     assert cells[1].id() in tasks[cells[0].id("metrics")].reads

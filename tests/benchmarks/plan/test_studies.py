@@ -74,7 +74,7 @@ def test_options_hold_before_the_file_and_their_paths_are_relative_to_where_one_
 def test_every_study_of_the_package_has_a_question_and_can_be_planned(name):
     study = read_study(name)
     assert study.question.endswith((".", "?")) or ":" in study.question
-    words = ("--methods", "simulation") if name in ("full",) else ()
+    words = ("--methods", "simulation") if name == "full" else ()
     plan = planned(name, *words)
     assert plan.study.written["name"] == name
     cells = [cell for cell in plan.cells if cell.entry.skip(cell.scene) is None]
