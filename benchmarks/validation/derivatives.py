@@ -43,7 +43,7 @@ def error(kind: str, term: str) -> float:
 
 
 def off_by(energy: energies.Energy, x: np.ndarray, d: np.ndarray, kind: str) -> tuple[float, float]:
-    """Return the error of a gradient or Hessian at x (V,3) along d (V,3) [m], and the size of what is due."""
+    """Return the error of a gradient or Hessian at x (V,3) along d (V,3) [m], and the size due."""
     hessian = sim.Potential([energy]).hessian(x) if kind == "hessian" else None
     claimed = energy.value_and_gradient(x)[1].ravel() if hessian is None else hessian
     at = [energy.value_and_gradient(x + steps * STEP * d) for steps in (-2, -1, 1, 2)]
