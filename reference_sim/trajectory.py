@@ -20,6 +20,8 @@ from reference_sim.given_files import demand_file
 if TYPE_CHECKING:
     import h5py
 
+PACKED: dict[str, Any] = {"compression": 1, "shuffle": True}  # by gzip
+
 
 class TrajectoryError(ValueError):
     """Trajectory file that cannot be read; the message names file and remedy."""
@@ -156,15 +158,16 @@ def _write_vtk(file: h5py.File, trajectory: Trajectory) -> None:
     root["NumberOfPoints"] = np.array([count], dtype="i8")
     root.create_dataset(
         "Points", data=np.asarray(trajectory.positions, dtype="f8").reshape(-1, 3), maxshape=(None, 3),
-        chunks=(count, 3), compression=1, shuffle=True,
+        chunks=(count, 3), **PACKED,
     )  # fmt: skip
     for name in ("Vertices", "Lines", "Polygons", "Strips"):
         cells = trajectory.faces if name == "Polygons" else np.zeros((0, 3))
         group = root.create_group(name)
         group["NumberOfCells"] = np.array([len(cells)], dtype="i8")
         group["NumberOfConnectivityIds"] = np.array([np.size(cells)], dtype="i8")
-        group["Connectivity"] = np.asarray(cells, dtype="i8").ravel()
-        group["Offsets"] = np.arange(len(cells) + 1, dtype="i8") * 3
+        offsets = np.arange(len(cells) + 1, dtype="i8") * 3
+        group.create_dataset("Connectivity", data=np.asarray(cells, dtype="i8").ravel(), **PACKED)
+        group.create_dataset("Offsets", data=offsets, **PACKED)
     steps = root.create_group("Steps")
     steps.attrs["NSteps"] = frames
     steps["Values"] = np.asarray(trajectory.times, dtype="f8")

@@ -142,6 +142,7 @@ PACKAGED = tuple(
         f"{entry.name}-packaged", f"{entry.label}, package",
         f"{entry.name} of the package, trained on all clips by sizes quick: trains nothing, seed 0 alone",
         base=entry.name, seeded=False,
+        options={"kind": entry.name, "packaged": network_name(entry.name, "tshirt", 0)},
     )
     for entry in NAMED
     if f"{entry.name}-packaged" in TRAININGS

@@ -29,6 +29,7 @@ from snug.networks.roll_out import (
     roll_out,
 )
 from snug.networks.trained_model import TrainedModel
+from snug.trained import list_networks
 from snug.training.contact_cache import Patch
 
 MARGIN = 2e-3  # [m]
@@ -133,9 +134,11 @@ class Network(Method):
         return replace(solution, positions=np.stack(cleaned))
 
 
-def make_network(*, models: Path, seed: int, kind: str, cleanup: bool = False) -> Network:
-    """Make the network of that name and seed."""
-    return Network(model_path(models, kind, seed), cleanup)
+def make_network(
+    *, models: Path, seed: int, kind: str, cleanup: bool = False, packaged: str = ""
+) -> Network:
+    """Make the network of that name and seed, or the one of that name in the package."""
+    return Network(list_networks()[packaged] if packaged else model_path(models, kind, seed), cleanup)
 
 
 def make_skinning(*, models: Path, seed: int) -> Network:

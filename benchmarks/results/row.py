@@ -105,7 +105,7 @@ class Row:
     pairing_group: str = ""
 
     def __post_init__(self) -> None:
-        moved = ((name, float(f"{change:.4g}")) for name, change in self.moved)  # JSON gives lists
+        moved = sorted((name, float(f"{change:.4g}")) for name, change in self.moved)  # JSON gives lists
         object.__setattr__(self, "moved", tuple(moved))
         if self.status not in STATUSES:
             raise self._error(f"status '{self.status}' is none of {', '.join(STATUSES)}")

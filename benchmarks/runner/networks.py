@@ -68,6 +68,10 @@ class NetworkTraining:
         """Return the path of the trained model."""
         return model_path(folder.models_of(self.network.garment), self.network.name, self.network.seed)
 
+    def files(self, folder: RunFolder) -> tuple[str, ...]:
+        """Return the name of the model's file in the folder; none of the package's, which stays there."""
+        return () if self.network.packaged else (folder.relative(self.path(folder)),)
+
 
 def train(job: NetworkTraining, context: Context, needed: Needed) -> Outcome:
     """Train the network and write its model."""
@@ -111,8 +115,9 @@ def train(job: NetworkTraining, context: Context, needed: Needed) -> Outcome:
 
 def _outcome(model: TrainedModel, job: NetworkTraining, run: RunFolder, facts: dict[str, Any]) -> Outcome:
     """Write the model; the outcome says how it was trained, and names the machine that trained it."""
-    path = job.path(run)
-    model.save(path)
+    files = job.files(run)
+    for name in files:
+        model.save(run.path / name)
     result = {
         "recipe": model.recipe.name,
         "left_out": model.origin["left_out"],
@@ -126,7 +131,7 @@ def _outcome(model: TrainedModel, job: NetworkTraining, run: RunFolder, facts: d
         "last": dict(model.history[-1]) if model.history else {},
     }
     origin = {"hardware": provenance.hardware_line(model.origin["hardware"])}
-    return Outcome(result=result | facts, files=(run.relative(path),), origin=origin)
+    return Outcome(result=result | facts, files=files, origin=origin)
 
 
 def origin_of(job: NetworkTraining, needed: Needed, *, left_out: list[str]) -> dict[str, Any]:
@@ -193,7 +198,7 @@ def find_pretrained(job: NetworkTraining, folder: Path) -> tuple[Path | None, st
 
 
 def take(job: NetworkTraining, source: Path, context: Context, needed: Needed) -> Outcome:
-    """Copy a network, once it is known to be whole."""
+    """Copy a network, once it is known to be whole; one of the package is read from there."""
     from snug.networks.trained_model import TrainedModel
 
     model = TrainedModel.load(source)

@@ -178,7 +178,7 @@ class Schedule:
         folder = FOLDER if network.packaged else folder
         fields: dict[str, Any] = {
             "kind": "network", "name": network.task_id[1], "label": network.label, "silent": True,
-            "files": (self.folder.relative(job.path(self.folder)),),
+            "files": job.files(self.folder),
         }  # fmt: skip
         if folder is not None:
             source, refusal = find_pretrained(job, folder)

@@ -263,6 +263,13 @@ def test_a_network_that_nothing_judges_is_not_called_the_same(seeds, note, compa
     assert comparison.headline["snug"][2].endswith(f" {note}") and comparison.compared == compared
 
 
+def test_run_times_are_of_the_scenes_in_which_solvers_were_timed_too():
+    whole = [row(s, "snug", "cost/whole", x, unit="ms") for s, x in zip(SCENES, (9.0, 2.0))]
+    both = [row(SCENES[1], name, "cost/frame", 2.0, unit="ms") for name in ("snug", "lbfgs-5")]
+    run = run_of([*a_run(), *whole, *both])
+    assert compare(run, run, times=True).headline["snug"][-1] == "2.00 → 2.00 same"
+
+
 def test_exit_status_and_lines(tmp_path, capsys):
     run_folder(tmp_path / "a", a_run(0))
     run_folder(tmp_path / "b", [times(1.3, **STRAIN)(given) for given in a_run(1)])

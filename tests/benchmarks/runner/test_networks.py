@@ -122,14 +122,14 @@ def test_a_run_from_files_simulates_and_trains_nothing_but_a_users_own(made, tmp
 
 
 def test_a_network_of_the_package_stands_beside_the_trained_one_where_it_fits(tmp_path):
-    def networks(**sizes) -> dict[str, tuple[str, str]]:
+    def networks(**sizes) -> dict[str, tuple[str, str, int]]:
         preset = dataclasses.replace(FEW, **sizes)
-        plan = plan_with(tmp_path, "pbns", "pbns-packaged", preset=preset)
-        return {task.label: (task.stage, task.skip) for task in tasks_of(plan) if task.kind == "network"}
+        tasks = tasks_of(plan_with(tmp_path, "pbns", "pbns-packaged", preset=preset))
+        return {t.label: (t.stage, t.skip, len(t.files)) for t in tasks if t.kind == "network"}
 
     fitting = networks(garment_vertices=1000, train_frames=5)  # however few steps and frames train here
-    assert fitting["pbns seed 0 (tshirt)"] == ("training", "")
-    assert fitting["pbns-packaged seed 0 (tshirt)"] == ("pretrained networks", "")
+    assert fitting["pbns seed 0 (tshirt)"] == ("training", "", 1)
+    assert fitting["pbns-packaged seed 0 (tshirt)"] == ("pretrained networks", "", 0)  # no copy of it
     assert "(assets)" in networks()["pbns-packaged seed 0 (tshirt)"][1]
 
 
