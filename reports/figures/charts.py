@@ -213,6 +213,9 @@ def _draw_page_one(
 MOST_ROWS, ROW = 15, 0.19  # methods, and inches of each
 
 
+EXPLODED = 1e4  # [%] a median that no axis should hold beside the others
+
+
 def excess_by_motion(run: Run) -> Drawing | None:
     """Draw relative excess: a row for each method of each garment, a dot for each motion."""
     rows = add_excess(run, run.garment_rows)
@@ -224,25 +227,27 @@ def excess_by_motion(run: Run) -> Drawing | None:
         return None
     several = medians.index.unique("garment").size > 1
     labels = [run.label(name) + f", {garment}" * several for garment, name in medians.index]
-    figure = new_figure(PAGE_WIDTH, max(ROW * min(len(medians), MOST_ROWS), PANEL) + 0.6)
+    count = min(int((medians < EXPLODED).sum()), MOST_ROWS)
+    figure = new_figure(PAGE_WIDTH, max(ROW * count, PANEL) + 0.6)
     axes = figure.add_subplot(xlabel="relative excess [%]")
     axes.set_xscale("symlog", linthresh=10.0, subs=(2, 5) if excesses.max() < 200.0 else (3,))
     for set_formatter in (axes.xaxis.set_major_formatter, axes.xaxis.set_minor_formatter):
         set_formatter(lambda value, _: power_text(value))
     axes.grid(True, axis="x", color=GRID, linewidth=0.6)
-    for place, (key, median) in enumerate(medians[:MOST_ROWS].items()):
+    for place, (key, median) in enumerate(medians[:count].items()):
         values, colour = excesses[key], style(run, key[1]).colour
         axes.plot(values, [place] * len(values), "o", color=colour, markersize=SMALL, alpha=0.6, mew=0.0)
         axes.plot(median, place, "|", color="black", markersize=9.0)
-    axes.set_yticks(range(len(labels[:MOST_ROWS])), labels[:MOST_ROWS])
+    axes.set_yticks(range(count), labels[:count])
     axes.invert_yaxis()
     caption = "A dot for each motion: 0 is the simulation, 100 skinning alone; bar: the median."
-    caption += f" Higher medians: {', '.join(labels[MOST_ROWS:])}." * (len(labels) > MOST_ROWS)
+    caption += f" Higher medians: {', '.join(labels[count:])}." * (len(labels) > count)
     return Drawing(figure, "excess_by_motion", caption)
 
 
 TERMS = ("strain", "bending", "inertia")
-LEAST = 1e-4  # of the largest energy that is shown: frames at rest would squeeze the rest
+# Least share of the largest energy that is shown: frames at rest would squeeze the rest.
+LEAST = 1e-4
 
 
 def energy_series(run: Run) -> Drawing | None:

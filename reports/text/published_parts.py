@@ -176,7 +176,12 @@ def _overview(folders: Sequence[Path], columns: Sequence[str], methods: Sequence
     rows: dict[str, list[str]] = {}
     for run in map(read_published, folders):
         missing = [name for name in methods if name in run.methods and name not in rows]
-        heads, *lines = text_rows(run, overview(run, missing)[0], columns)
+        head, *lines = text_rows(run, overview(run, missing)[0], columns)
+        if heads and head != heads:
+            raise ValueError(
+                f"page one has the columns {', '.join(head)} in one of {', '.join(map(str, folders))}"
+            )
+        heads = head
         rows |= dict(zip(run.order(missing), lines))
     return [heads, *(rows[name] for name in methods)]
 

@@ -25,9 +25,9 @@ LETTERS = 1.0  # [points] by which boxes of texts may overlap: letters do not fi
 
 @pytest.fixture(scope="module")
 def drawings() -> list[Drawing]:
-    """The figures of the published run of 26 methods."""
-    run = read_published(PUBLISHED / "ablations")
-    return [drawing for figure in FIGURES if (drawing := figure.draw(run))]
+    """The figures of published runs, one of 26 methods, one with a method whose energy explodes."""
+    runs = [read_published(PUBLISHED / name) for name in ("ablations", "paper_text")]
+    return [drawing for run in runs for figure in FIGURES if (drawing := figure.draw(run))]
 
 
 def test_panels_of_many_methods_are_at_least_four_centimetres_wide_and_high(drawings):
@@ -78,7 +78,8 @@ def texts(canvas) -> tuple[list[Text], list[Text]]:
         around.append(axes.title)
         for axis in (axes.xaxis, axes.yaxis):
             low, high = sorted(axis.get_view_interval())
-            ticks = [tick for tick in axis.get_major_ticks() if low <= tick.get_loc() <= high]
+            ticks = (*axis.get_major_ticks(), *axis.get_minor_ticks())
+            ticks = [tick for tick in ticks if low <= tick.get_loc() <= high]
             around += [axis.label, *(tick.label1 for tick in ticks)]
     written = [text for axes in canvas.axes for text in axes.texts]
     return tuple(
