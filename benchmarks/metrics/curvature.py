@@ -190,7 +190,8 @@ CURVATURE = Measurements(
     "curvature",
     metrics_of(
         ("curvature/mean", "1/m", "Mean curvature",
-         "magnitude of the mean curvature, mean over interior vertices by area and over frames"),
+         "magnitude of the mean curvature (cotangent Laplacian over mixed Voronoi areas), mean over interior "
+         "vertices by area and over frames"),
         ("curvature/histogram", "1/m", "Curvature, distribution",
          "Wasserstein-1 distance between the area-weighted distributions of H at the same frame",
          {"lower_is_better": True}),
@@ -201,8 +202,8 @@ CURVATURE = Measurements(
          {"lower_is_better": True}),
         ("curvature/change", "1", "Change of wrinkles",
          "share of the scatter of curvature that is change over time: mean |H - median of the vertex over "
-         "frames| divided by mean |H - mean of all vertices and frames|, weighted by area; 0 where "
-         "wrinkles never change, at most 1"),
+         "frames| divided by mean |H - mean of all vertices and frames|, weighted by each vertex's mean "
+         "area; 0 where wrinkles never change, at most 1"),
         table="curvature",
     ),
     measure=measure, compare=compare, series=series,

@@ -202,10 +202,10 @@ DYNAMICS = Measurements(
     "dynamics",
     metrics_of(
         ("dynamics/quasi_static_difference", "mm", "From quasi-static",
-         "root mean square distance to the method's own quasi-static solution"),
+         "root mean square distance of all vertices to the method's own quasi-static solution"),
         ("dynamics/correlation", "1", "Hem correlation",
-         "cosine between the dynamic parts of method and simulation: the hem's motion less the method's "
-         "own quasi-static solution"),
+         "cosine between the dynamic parts of method and simulation: the hem's motion in the axes of the "
+         "root, less the method's own quasi-static solution, less its mean over time"),
         ("dynamics/amplitude", "1", "Hem amplitude",
          "root mean square of the hem's dynamic part, divided by the simulation's; says nothing without the "
          "correlation, an untrained network has one too"),

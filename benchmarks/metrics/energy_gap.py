@@ -42,7 +42,8 @@ if TYPE_CHECKING:
 # of one minimisation: a limit by the clock would make a gap depend on how busy a machine is
 ITERATIONS = 300
 PRECISION = 0.1  # standard error of the gap, as a share of it
-NEGLIGIBLE = 1e-6  # of the scale: a standard error below it is small enough however small the gap is
+# Share of the scale: a standard error below it is small enough however small the gap is.
+NEGLIGIBLE = 1e-6
 MEANS = ("gap/energy", "gap/local", "gap/refrozen", "step/distance", "step/curvature", "gradient/norm")
 
 
@@ -203,7 +204,7 @@ GAP = Measurements(
     "optimality",
     metrics_of(
         ("gap/energy", "J", "Energy gap",
-         "energy of a frame above the lowest minimum found of its own time step, mean over frames"),
+         "energy of a frame above the lowest minimum found of its own time step, mean over sampled frames"),
         ("gap/relative", "1", "Relative energy gap",
          "energy gap divided by gap/scale, which is the same for all methods of a scene"),
         ("gap/scale", "J", "Scale of the gap",

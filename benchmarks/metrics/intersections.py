@@ -20,7 +20,8 @@ if TYPE_CHECKING:
     from benchmarks.metric import Faces, Floats, RollOut, Vertices
 
 SAMPLED_STEPS = 12  # pairs of consecutive frames that are looked at, evenly spread
-FARTHEST = 1.0  # [m] beside the others that a vertex moves in a frame: one that is lost moves further
+# No vertex moves as far beside the others in a frame, but one that is lost.
+FARTHEST = 1.0  # [m]
 MOST_PAIRS = 200_000  # to be tested one by one, in seconds: more have only lost cloths
 
 
@@ -109,9 +110,10 @@ INTERSECTIONS = Measurements(
     "intersections",
     metrics_of(
         ("intersections/triangles", "%", "Self-cut",
-         "triangles that pass through another one of the same cloth, mean over frames"),
+         "triangles that pass through another one of the cloth without a common vertex, mean over frames"),
         ("intersections/contours", "m", "Contours",
-         "length of the lines in which triangles of the cloth pass through others of it, mean over frames"),
+         "length of the lines in which triangles of the cloth pass through others of it without a common "
+         "vertex, mean over frames"),
         ("intersections/swept", "1", "Swept",
          "pairs of a vertex and a triangle, or of two edges, of the cloth that pass through each other on "
          "straight ways between two frames; mean over 12 pairs of frames, needs ipctk"),

@@ -198,10 +198,10 @@ GEOMETRY = Measurements(
          "root mean square distance between the same vertices of method and simulation"),
         ("distance/p95", "mm", "95 %", "95 % of these distances are smaller"),
         ("penetration/vertices", "%", "Penetration",
-         "vertices inside the body, none left out, mean over frames"),
+         "vertices inside the body (winding number above 0), none left out, mean over frames"),
         ("penetration/surface", "%", "Surface inside",
-         "share of the cloth's area inside the body, at vertices, midpoints of edges and centroids, mean "
-         "over frames"),
+         "share of the cloth's present area inside the body: of a triangle's a vertex stands for 1/20, the "
+         "midpoint of a side for 2/15, the centroid for 9/20; mean over frames"),
         ("penetration/deep", "%", "Deep", "vertices more than 5 mm inside the body"),
         ("penetration/depth_p99", "mm", "Depth, 99 %",
          "99 % of all vertices and frames are less deep; 0 outside", {"table": ""}),

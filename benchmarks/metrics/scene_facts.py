@@ -14,7 +14,8 @@ if TYPE_CHECKING:
     from benchmarks.metric import Faces, RollOut, Vertices
 
 SAMPLED_FRAMES = 24  # frames that are looked at, evenly spaced
-OFFSET = 1e-3  # [m] off the skin, where a point is inside the body only if another part of it is there
+# So far off the skin a point is inside the body only if another part of it is there.
+OFFSET = 1e-3  # [m]
 
 
 def measure_mesh(roll_out: RollOut) -> dict[str, float]:

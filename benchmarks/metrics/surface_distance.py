@@ -24,7 +24,8 @@ if TYPE_CHECKING:
     from benchmarks.metric import Faces, Floats, RollOut, Vertices
 
 SAMPLED_FRAMES = 12  # frames that are looked at, evenly spread
-LOST = 1e6  # [m] from the origin: a vertex so far off is on no surface, and its square may overflow
+# A vertex so far from the origin is on no surface, and its square may overflow.
+LOST = 1e6  # [m]
 
 
 def compare(roll_out: RollOut, reference: RollOut) -> dict[str, float]:
