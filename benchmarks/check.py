@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator, Sequence
@@ -57,7 +56,8 @@ SIZES = replace(
     sheet_cells=4, sheet_frames=6, cell_seconds=120.0, least_seconds=0.02, repeats=1,
 )  # fmt: skip
 PLACE_TOLERANCE = 1e-6  # [m] of what should be in its place; times a frame's length in float32
-CLOCK_SLACK = 1.1  # of the clock: what frames say of themselves may be more by so much, in all
+# Factor of the clock by which what frames say of themselves may be more, in all.
+CLOCK_SLACK = 1.1
 DISPLACEMENT = 0.02  # of the mean edge, for the places at which derivatives are compared
 DERIVATIVE_TOLERANCE = 1e-4  # of a derivative along a direction
 SUM_ROUND_OFF = 1e-13  # of a sum of many terms, as a share of it
@@ -295,4 +295,4 @@ def check_derivatives(energy: Energy, scene: BuiltScene) -> None:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

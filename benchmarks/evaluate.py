@@ -154,10 +154,8 @@ def _save(reference: Reference, cell: Cell, context: Context) -> Outcome:
     static[:, built.dressed.garment.hem] = reference.hem
     path = folder.trajectory_path(*cell.key)
     times = np.arange(len(static)) * built.dt
-    for positions, to in (
-        (reference.positions, path),
-        (static, folder.quasi_static_path(cell.scene.name)),
-    ):
+    files = {path: reference.positions, folder.quasi_static_path(cell.scene.name): static}
+    for to, positions in files.items():
         Trajectory(positions, built.cloth.faces, times, status="converged").save(to)
     facts = {"terms": "+".join(built.terms)}
     return Outcome(reference.status, reference.reason, result=facts, files=(folder.relative(path),))

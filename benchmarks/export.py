@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -53,11 +52,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     folder = Path(options.out)
     garment, _, motion = options.scene.rpartition("/")
     if motion == "training-motions":
-        from benchmarks.runner.training_motions import plan_training_motions, write_training_motions
+        from benchmarks.runner.training_motions import write_training_motions
 
         if folder.is_dir():
             raise StudyError(f"{folder}: is a folder; name a file, as motions.h5")
-        written = write_training_motions(garment, plan_training_motions(garment, options), folder)
+        written = write_training_motions(garment, options, folder)
         print(f"{len(written)} training motions of {garment} in {folder}")
         return 0
     demand_new(folder)
@@ -81,4 +80,4 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

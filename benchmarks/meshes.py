@@ -7,7 +7,8 @@ import numpy as np
 from reference_sim.geometry.topology import half_edges
 
 FAMILIES = ("right", "cross", "union_jack", "equilateral", "delaunay")
-ROW = 2 / 3**0.5  # of the equilateral family: distance of neighbours in a column, over that of columns
+# In the equilateral family: distance of neighbours in a column, over that of columns.
+ROW = 2 / 3**0.5
 
 
 def jittered_patch(cells: int) -> tuple[np.ndarray, np.ndarray]:

@@ -126,24 +126,6 @@ def posed_body(dressed: Dressed) -> Callable[[int], tuple[np.ndarray, np.ndarray
 
 
 @dataclass(frozen=True, kw_only=True)
-class Reporting:
-    """Place of a method among others in reports: curves, comparisons and pairing of seeds.
-
-    Attributes:
-        family: methods of one curve, which differ in effort alone; the method's own name where it is
-            empty.
-        level: place on that curve, as a number of iterations or a tolerance.
-        base: name of the method that this one is compared with.
-        pairing_group: shared by methods compared seed by seed.
-    """
-
-    family: str = ""
-    level: float | None = None
-    base: str = ""
-    pairing_group: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
 class MethodEntry:
     """Declaration of a method: cheap to list. Its module is imported when a cell needs it.
 
@@ -179,8 +161,11 @@ class MethodEntry:
         left_out: reason why it is not run; empty where it runs.
         role: its place in tables and plots: `solver`, `warm-started`, `network`, `ablation`, `baseline`,
             `external`, or another of benchmarks.results.row.ROLES.
-        reporting: a Reporting, which joins the members of a family by a line and names the method to
-            compare with; for reports alone.
+        family: methods of one curve of a report, which differ in effort alone; the method's own name
+            where it is empty.
+        level: place on that curve, as a number of iterations or a tolerance.
+        base: name of the method that reports compare this one with.
+        pairing_group: shared by methods compared seed by seed.
 
     Raises:
         DeclarationError: an unknown role.
@@ -209,7 +194,10 @@ class MethodEntry:
     static_known: bool = True
     left_out: str = ""
     role: str = "baseline"
-    reporting: Reporting = Reporting()
+    family: str = ""
+    level: float | None = None
+    base: str = ""
+    pairing_group: str = ""
 
     def __post_init__(self) -> None:
         if self.role not in ROLES:

@@ -62,10 +62,6 @@ class Preset:
     simulated_mixed: int = 1_000_000
     turns: float = 1.0
 
-    def steps_of(self, training: str, kind: str) -> int:
-        """Return the optimiser steps of a training by its name, else its kind."""
-        return self.steps.get(training, self.steps.get(kind, 0))
-
 
 def _read_presets() -> tuple[Preset, ...]:
     tables = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))

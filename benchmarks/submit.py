@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import math
 import os
-import sys
 import tempfile
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
@@ -22,7 +21,7 @@ import numpy as np
 from benchmarks.external.roll_out_files import PLACE, RollOutOption, read_roll_out
 from benchmarks.plan.cell import flat
 from benchmarks.plan.plan import Plan, make_plan
-from benchmarks.plan.study import read_fields, read_study
+from benchmarks.plan.study import StudyError, read_fields, read_study
 from benchmarks.presets import find_preset
 from benchmarks.provenance import digest, digest_of_file
 from benchmarks.results.protocol import DIGEST, NUMBER
@@ -56,10 +55,6 @@ EXAMPLES = """examples:
 DIR has entry.toml and one roll-out for each scene, or a program (docs/entries.md). Both check and score load
   the program, and score runs it: read the program of somebody else first.
 exit status: 0 fine; 2 a fault of DIR: one line."""
-
-
-class EntryError(ValueError):
-    """An entry with a fault; the message names file and remedy."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -147,7 +142,7 @@ class Entry:
         for cell in plan.cells:
             mine = cell.method not in MEASURED_BESIDE
             if mine and cell.method != self.name:
-                raise EntryError(
+                raise StudyError(
                     f"{self.path / metadata.program}: declares method '{cell.method}': one of the folder's "
                     f"name, '{self.name}', is expected"
                 )
@@ -195,30 +190,30 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def read_entry(path: Path) -> Entry:
     """Read the metadata of an entry.
 
-    Raises EntryError for a link out of the folder, a pipe or a device, StudyError with file and field.
+    Raises StudyError for a link out of the folder and a wrong field, OSError for a pipe or a device.
     """
     for file in path.rglob("*"):
         if not Path(os.path.realpath(file)).is_relative_to(path.resolve()):
-            raise EntryError(f"{file}: is a link out of the entry's folder: put the file itself there")
+            raise StudyError(f"{file}: is a link out of the entry's folder: put the file itself there")
         if not file.is_dir():
             demand_file(file)
     return Entry(path, read_fields(Metadata, path / METADATA))
 
 
 def check_scores(entry: Entry) -> None:
-    """Raise EntryError for scores of files that have changed since."""
+    """Raise StudyError for scores of files that have changed since."""
     if not entry.scores.config_path.is_file():
         return
     then, now = entry.scores.read_config().get("entry") or {}, entry.digests()
     if changed := sorted(name for name in then.keys() | now.keys() if then.get(name) != now.get(name)):
         names = ", ".join(changed)
-        raise EntryError(f"{entry.path}: not as it was scored: {names}: put it right, or score it again")
+        raise StudyError(f"{entry.path}: not as it was scored: {names}: put it right, or score it again")
 
 
 def write_scores(entry: Entry, run: RunFolder) -> int:
     """Write rows without what the machine adds to them, and digests of all that was scored; return how many.
 
-    The bytes are the same each time, but for commit and date. Raises EntryError for a copy, and where a
+    The bytes are the same each time, but for commit and date. Raises StudyError for a copy, and where a
     roll-out did not come to its last frame: the mean over the other scenes would be of easier ones.
     """
     from benchmarks.metrics import find_metric
@@ -237,7 +232,7 @@ def write_scores(entry: Entry, run: RunFolder) -> int:
         bad = next((row for row in mine if row.status not in USABLE), None)
         if bad or not mine:
             reason = f"seed {bad.seed}: {bad.status}: {bad.reason}" if bad else "it did not run"
-            raise EntryError(f"{entry.path}: {scene}: {reason}")
+            raise StudyError(f"{entry.path}: {scene}: {reason}")
     cells = dict.fromkeys((row.scene, row.method, row.seed) for row in rows if row.method == entry.name)
     frames = {
         f"{flat(scene)}-seed{seed}": Trajectory.load(run.trajectory_path(scene, method, seed)).positions
@@ -265,7 +260,7 @@ def sample(positions: Positions) -> Floats:
 
 
 def find_copies(entry: Entry, samples: dict[str, Floats]) -> None:
-    """Raise EntryError for a roll-out whose frames another scene, or another entry beside it, has.
+    """Raise StudyError for a roll-out whose frames another scene, or another entry beside it, has.
 
     So duplicates are found, frames in reverse, and one frame held. samples: name of a roll-out -> (T,N).
     """
@@ -287,8 +282,8 @@ def find_copies(entry: Entry, samples: dict[str, Floats]) -> None:
                 order = np.sign(np.diff(nearest[same]).mean())
                 way = {0.0: "one of them held", 1.0: "in order", -1.0: "in reverse"}[float(order)]
                 copied = f"its frames are those of {' '.join(whose)}, {way}"
-                raise EntryError(f"{entry.path}: {name}: {copied}")
+                raise StudyError(f"{entry.path}: {name}: {copied}")
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    raise SystemExit(main())

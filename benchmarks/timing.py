@@ -28,9 +28,11 @@ if TYPE_CHECKING:
 
 # [s] for which the process is watched once the clock has stopped, and again where it is at work
 AFTER = 0.05
-WATCHES = 3  # times in a row; a machine that is busy elsewhere lends its time to one of them, not to all
+# Times in a row; a machine that is busy elsewhere lends its time to one of them, not to all.
+WATCHES = 3
 BUSY = 0.3  # share of AFTER which the processor may be at work
-CROWDED = 1.3  # processor seconds per second on the clock, beyond which more than one thread has worked
+# Processor seconds per second on the clock, beyond which more than one thread has worked.
+CROWDED = 1.3
 GRAIN = 0.05  # [s] below which processor time is too coarse to be compared
 MOST = 1000  # runs, of what takes no time
 

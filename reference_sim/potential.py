@@ -21,7 +21,7 @@ SPARE_BLOCKS = 3
 class HessianPattern:
     """Pattern of the sum of `energies` over the free vertices, built once per scene.
 
-    Dynamic terms have no blocks in it at first: `covering` gives a wider pattern when they couple
+    Dynamic terms have no blocks in it at first: `widen` gives a wider pattern when they couple
     vertices that no other term couples.
 
     The matrix is stored as the lower triangle of vertex blocks (diagonal blocks whole), in CSC order, as

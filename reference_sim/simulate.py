@@ -123,7 +123,7 @@ def read_cloth(options: argparse.Namespace) -> Cloth:
     positions = to_metres_y_up(surface.positions, units=options.units, up=options.up)
     try:
         refuse_too_many(len(positions))
-        if options.weld:
+        if options.weld is not None:
             surface = join_seams(replace(surface, positions=positions), options.weld)
             positions = surface.positions
         return Cloth(positions, surface.faces, material, pins=choose_pins(options.pins, positions))

@@ -43,7 +43,7 @@ class State:
 class TimeStepper:
     """Backward Euler from frame to frame: the potential, its minimiser, the rule for a first guess.
 
-    All that many runs of one scene can share is set up here; `start_again` stands between two of them.
+    All that many runs of one scene can share is set up here; `minimiser.start_again` stands between two.
 
     Args:
         energies, dt, obstacle: as in `simulate`.
@@ -97,10 +97,6 @@ class TimeStepper:
         self.potential = Potential([*energies, Inertia(cloth, self.dt)])
         self.quasi_static = quasi_static
         self.minimiser = StepMinimiser(self.potential, **options)
-
-    def start_again(self) -> None:
-        """Let the next run give the bits of a first one."""
-        self.minimiser.start_again()
 
     def advance(
         self, frame: int, state: State, pins: np.ndarray | None
@@ -176,7 +172,7 @@ class TimeStepper:
             )
         v = _finite(np.zeros_like(rest) if velocity is None else velocity, rest.shape, "velocity")
         provenance = self.provenance()
-        if any(energy.joins_late for energy in self.potential.energies):
+        if any(energy.dynamic for energy in self.potential.energies):
             self.prepare(1, x, v, pins)
             if infeasibility := self.potential.infeasibility(x):
                 raise ValueError(

@@ -46,13 +46,6 @@ class Report:
 
 
 @dataclass(frozen=True)
-class Heading:
-    """A heading; it stands only where a block below it has content."""
-
-    title: str
-
-
-@dataclass(frozen=True)
 class TableBlock:
     """A table; the PDF prints at most so many lines, none that ends in one of `left_out`."""
 
@@ -84,19 +77,20 @@ class TableBlock:
         )
 
 
-BLOCKS: tuple[Heading | Figure | TableBlock, ...] = (
+# A text is a heading; it stands only where a block below it has content.
+BLOCKS: tuple[str | Figure | TableBlock, ...] = (
     TableBlock("paper_table_1"),
     TableBlock("paper_table_2", limit=24),
     Figure("frames", draw_methods),
     Figure("error_against_time", error_of_page_one),
     TableBlock("overview"),
-    Heading("The paper's tables"),
+    "The paper's tables",
     TableBlock("energies"),
     TableBlock("table_1"),
     TableBlock("curvature"),
     TableBlock("table_2", limit=24),
     TableBlock("cost"),
-    Heading("Findings"),
+    "Findings",
     TableBlock("relative_excess"),
     Figure("excess_by_motion", excess_by_motion),
     TableBlock("excess_by_time_step"),
@@ -104,16 +98,16 @@ BLOCKS: tuple[Heading | Figure | TableBlock, ...] = (
     TableBlock("errors_in_spreads"),
     TableBlock("findings", left_out=("exploratory", "inconclusive: one seed")),
     TableBlock("ablation_effects"),
-    Heading("Dynamics"),
+    "Dynamics",
     TableBlock("dynamics"),
     Figure("energy_series", energy_series),
-    Heading("Body shapes"),
+    "Body shapes",
     TableBlock("shapes"),
-    Heading("Validation"),
+    "Validation",
     TableBlock("validation", left_out=("pass", "reported")),
-    Heading("Stress"),
+    "Stress",
     TableBlock("extremes", left_out=("converged",)),
-    Heading("Cells that failed or were skipped"),
+    "Cells that failed or were skipped",
     TableBlock("unfinished"),
 )
 

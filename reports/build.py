@@ -98,8 +98,9 @@ def save_still(run_dir: str | Path, method: str, path: Path) -> None:
     from reports.pictures import AZIMUTH, SceneRollOuts, draw_frames
 
     run = read_run(RunFolder(run_dir))
-    scene = str(run.frame[run.frame["method"] == method]["scene"].iloc[0])
-    cloth = run.roll_outs.cloth(scene, method, 0)
+    first = run.frame[run.frame["method"] == method].iloc[0]
+    scene = str(first["scene"])
+    cloth = run.roll_outs.cloth(scene, method, int(first["seed"]))
     assert cloth is not None
     group = SceneRollOuts(scene, {method: cloth}, None, {method: run.label(method)})
     (image,) = draw_frames(group, 160, AZIMUTH, [group.lively_frame()[0]])

@@ -31,17 +31,14 @@ from reports.scene_changes import (
 from reports.statistics.effects import DIFFERENCE, RATIO, Effect, effect
 from reports.statistics.means_and_spreads import Mean, means, value_of
 from reports.statistics.pareto import NETWORK, REPEATS, TIME, WHOLE, select_timed
-from reports.statistics.relative_excess import (
-    RELATIVE_EXCESS,
-    add_excess,
-    excess_of,
-    relative_metric,
-)
+from reports.statistics.relative_excess import RELATIVE_EXCESS, add_excess, excess_of, relative_metric
 from reports.statistics.verdicts import effect_of, holm
 from reports.tables.table import DASH, number
 
-ONCE = 2.0  # factor of a time that was taken once: below it another load of the machine may be the cause
-WORST = "cost/frame_worst"  # the time of one frame, which anything else on the machine may have delayed
+# Factor of a time that was taken once: below it another load of the machine may be the cause.
+ONCE = 2.0
+# The time of one frame, which anything else on the machine may have delayed.
+WORST = "cost/frame_worst"
 CELL = ["scene", "method", "seed", "metric"]
 
 
@@ -374,8 +371,8 @@ def _exceeds_noise(metric: Metric, shift: Effect, p: float | None) -> bool:
         low, high = shift.ends or (shift.value - shift.uncertainty, shift.value + shift.uncertainty)
         return shift.scale != RATIO or max(low, -high) > math.log1p(TIME_TOLERANCE)  # from 0, or to 0
     if p is None:
-        return abs(shift.gap()) > SPREADS * shift.uncertainty
-    return abs(shift.gap()) > shift.uncertainty and p < LEVEL
+        return abs(shift.value) > SPREADS * shift.uncertainty
+    return abs(shift.value) > shift.uncertainty and p < LEVEL
 
 
 def _select_common(one: pd.DataFrame, other: pd.DataFrame) -> list[pd.DataFrame]:

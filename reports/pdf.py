@@ -14,7 +14,7 @@ import typst
 
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.files.atomic_files import replacing
-from reports.blocks import BLOCKS, Heading, Report, TableBlock
+from reports.blocks import BLOCKS, Report, TableBlock
 from reports.figures.plotting import Figure, escape
 from reports.finished_run import Run
 from reports.sentences import headline
@@ -108,8 +108,8 @@ def content(report: Report) -> dict[str, Any]:
     run, config = report.run, report.run.config
     sections: list[dict[str, Any]] = [{"title": "", "blocks": []}]  # page one has no heading
     for block in BLOCKS:
-        if isinstance(block, Heading):
-            sections.append({"title": block.title, "blocks": []})
+        if isinstance(block, str):
+            sections.append({"title": block, "blocks": []})
         else:
             sections[-1]["blocks"] += lay_out(report, block)
     workers = config.get("workers") or 1

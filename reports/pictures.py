@@ -21,7 +21,8 @@ from reports.tables.table import name_scene
 BODY_COLOUR = (0.80, 0.77, 0.74)
 CLOTH_COLOUR = (0.72, 0.33, 0.22)  # mid-tone: folds show in both directions, in grey too
 KEY, FILL = np.array([-0.78, 0.42, 0.46]), np.array([0.7, 0.1, 0.7])  # lights: right, up, towards
-LIFT = 0.012  # [m] that cloth is nearer: a coarse triangle cuts through the skin between its corners
+# Cloth is drawn as much nearer: a coarse triangle cuts through the skin between its corners.
+LIFT = 0.012  # [m]
 SAMPLES = 2  # of a pixel along each axis
 ABOVE = 8.0  # [degrees] that the camera looks down
 

@@ -28,7 +28,8 @@ TOLERANCE = 0.05  # share of any other answer
 TIME_TOLERANCE = 0.2  # share of a time or memory that was repeated
 # share of the median method's value; a smaller difference is none, whatever it is a share of
 FLOOR = 1e-4
-SPREADS = 3.0  # times the reference's noise, beyond which an answer that nothing repeats has changed
+# Times the reference's noise, beyond which an answer that nothing repeats has changed.
+SPREADS = 3.0
 
 
 @dataclass(frozen=True)
@@ -94,7 +95,8 @@ def is_negligible(metric: Metric, mean: Mean, new: Mean, shift: Effect, scale: f
     return abs(shift.value) <= limit
 
 
-ODD = 3.0  # times the median scatter of scenes, beyond which a scene is left out of the pooled scatter
+# Times the median scatter of scenes, beyond which a scene is left out of the pooled scatter.
+ODD = 3.0
 NETWORK_METRIC = ["method", "metric"]
 
 

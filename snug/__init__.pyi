@@ -11,7 +11,6 @@ from .motion.library import LIBRARY as LIBRARY
 from .motion.library import make_motion as make_motion
 from .motion.motion import Motion as Motion
 from .named_recipes import RECIPES as RECIPES
-from .named_recipes import find_recipe as find_recipe
 from .networks.dressed_body import DressedBody as DressedBody
 from .networks.roll_out import roll_out as roll_out
 from .networks.trained_model import TrainedModel as TrainedModel
@@ -29,7 +28,6 @@ __all__ = [
     "Motion",
     "Recipe",
     "TrainedModel",
-    "find_recipe",
     "find_template",
     "load_motions",
     "make_motion",

@@ -60,9 +60,10 @@ class GarmentFile:
             raise ValueError(f"shift={self.shift}: give three numbers [m], as '0 0.1 0'")
         if not _is_number(self.weld) or self.weld <= 0.0:
             raise ValueError(f"weld={self.weld}: give a distance above 0 [m]")
-        if self.uv_scale is not None and (self.rest != "uv" or not _is_number(self.uv_scale)):
+        scale = self.uv_scale
+        if scale is not None and (self.rest != "uv" or not _is_number(scale) or scale <= 0.0):
             raise ValueError(
-                f"uv_scale={self.uv_scale}: is a number for a rest shape from UV: add rest=uv"
+                f"uv_scale={scale}: is a number above 0 for a rest shape from UV: add rest=uv"
             )
         if not re.fullmatch(r"\w[\w.+-]*", self.name):
             raise ValueError(
@@ -152,11 +153,10 @@ def is_garment_file(word: str) -> bool:
 def parse_garment_file(text: str) -> GarmentFile:
     """Return the garment file that FILE[,key=value...] means. Raises ValueError."""
     path, options = split_words(text)
-    options = {"path": path, **options}
     if "shift" in options:
         shift = options["shift"]
         options["shift"] = tuple(shift) if isinstance(shift, list) else (shift,)
-    return _make(GarmentFile, options, text)
+    return _make(GarmentFile, options, text, path=path)
 
 
 def parse_motion_files(text: str) -> tuple[str, MotionFileOptions]:
@@ -165,11 +165,12 @@ def parse_motion_files(text: str) -> tuple[str, MotionFileOptions]:
     return path, _make(MotionFileOptions, options, text)
 
 
-def _make(kind: Any, options: dict[str, Any], text: str) -> Any:
-    names = [field.name for field in fields(kind)]
+def _make(kind: Any, options: dict[str, Any], text: str, **path: str) -> Any:
+    names = [field.name for field in fields(kind) if field.name not in path]
     for name in options:
         if name not in names:
             raise ValueError(f"{text}: no word is called '{name}'; there are {', '.join(names)}")
+    options = path | options
     try:
         for name in {"path", "material"} & options.keys():
             if not (place := options[name]) or place is True:

@@ -18,7 +18,7 @@ from snug.named_recipes import (
     SUPERVISED,
     TAILORNET,
 )
-from snug.recipe import DEFAULT, Recipe, RecipeError
+from snug.recipe import DEFAULT, Recipe
 
 if TYPE_CHECKING:
     from snug.networks.garment_network import GarmentNetwork
@@ -40,7 +40,6 @@ class Kind:
         targets: what teaches it: the `energies`, simulated `vertices`, or `bands` of their unposed
             offsets (snug.training.simulated_data).
         static: whether it knows single frames alone, so that no inertia is in its loss.
-        closed_form: whether it trains faster by snug.kernels.gru.
         cost: time of a step, where one of SNUG's takes 1.
     """
 
@@ -51,7 +50,6 @@ class Kind:
     recipe: Recipe = DEFAULT
     targets: str = "energies"
     static: bool = False
-    closed_form: bool = False
     cost: float = 1.0
 
     @property
@@ -72,9 +70,9 @@ class Kind:
         return UNITS[self.targets]
 
     def check(self, recipe: Recipe) -> None:
-        """Raise RecipeError for a `physics_weight` where no simulated vertices teach."""
+        """Raise ValueError for a `physics_weight` where no simulated vertices teach."""
         if recipe.physics_weight and self.targets != "vertices":
-            raise RecipeError(
+            raise ValueError(
                 f"recipe option physics_weight={recipe.physics_weight}: {self.name} learns no simulated "
                 "vertices; use 0"
             )
@@ -83,7 +81,7 @@ class Kind:
 KINDS = {
     kind.name: kind
     for kind in (
-        Kind(name="snug", label="SNUG", architecture="regressor.Regressor", closed_form=True),
+        Kind(name="snug", label="SNUG", architecture="regressor.Regressor"),
         Kind(
             name="pbns",
             label="PBNS",
@@ -98,7 +96,6 @@ KINDS = {
             architecture="regressor.Regressor",
             recipe=SUPERVISED,
             targets="vertices",
-            closed_form=True,
         ),
         Kind(
             name="santesteban2019",
@@ -106,7 +103,6 @@ KINDS = {
             architecture="santesteban2019.FitAndWrinkles",
             recipe=SANTESTEBAN2019,
             targets="vertices",
-            closed_form=True,
         ),
         Kind(
             name="tailornet",

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from snug.recipe import DEFAULT, TERMS, Recipe, RecipeError
+from snug.recipe import DEFAULT, TERMS, Recipe
 
 # docs/method.md lists where it departs from the text by no option. Contact is taken to cached points of
 # the skin, for searching all 48 frames of a step would take several times as long as the rest of it.
@@ -123,14 +123,3 @@ ABLATIONS = (
     replace(DEFAULT, name="printed-bending", bending="none"),
 )
 RECIPES = {recipe.name: recipe for recipe in (DEFAULT, *PAPERS, PBNS, PBNS_SPRINGS, *ABLATIONS)}
-
-
-def find_recipe(name: str) -> Recipe:
-    """Return the recipe of that name. Raises RecipeError naming the known ones.
-
-    >>> find_recipe("paper").window
-    3
-    """
-    if name not in RECIPES:
-        raise RecipeError(f"unknown recipe {name!r}: use one of {', '.join(RECIPES)}")
-    return RECIPES[name]

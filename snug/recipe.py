@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator
-from dataclasses import asdict, dataclass, field, fields
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 from reference_sim import energies
@@ -18,10 +18,6 @@ from reference_sim.energies import Energy
 TERMS = ("strain", "bending", "gravity", "inertia", "collision")
 INITIALISATIONS = ("torch", "keras")
 INERTIA_FORMS = ("equation_5", "detached_past", "two_transitions")
-
-
-class RecipeError(ValueError):
-    """A recipe that cannot be trained: the message names the option, its value and what it may be."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -134,44 +130,40 @@ class Recipe:
             ("shape_of", ("window", "clip")),
         ):
             if getattr(self, option) not in choices:
-                raise RecipeError(
+                raise ValueError(
                     f"recipe option {option}={getattr(self, option)!r}: use one of {choices}"
                 )
         for term in (name for name in self.terms if name not in TERMS):
             try:
                 find_energy(term)
             except ValueError as error:
-                raise RecipeError(
+                raise ValueError(
                     f"recipe option terms: {error}; the recipes here have {TERMS}"
                 ) from error
         if min(self.window, self.batch, self.window_stride, self.even) < 1:
-            raise RecipeError("recipe options window, batch, window_stride and even must be at least 1")
+            raise ValueError("recipe options window, batch, window_stride and even must be at least 1")
         if "inertia" in self.terms and self.window < 3:
-            raise RecipeError("recipe option window: inertia needs two frames before its own, so >= 3")
+            raise ValueError("recipe option window: inertia needs two frames before its own, so >= 3")
         for option in (
             "smoothing", "weight_decay", "h0_sigma", "shape_range", "shape_share", "mixed", "turn",
             "physics_weight",
         ):  # fmt: skip
             if not getattr(self, option) >= 0:
-                raise RecipeError(f"recipe option {option}={getattr(self, option)}: must not be negative")
+                raise ValueError(f"recipe option {option}={getattr(self, option)}: must not be negative")
         if self.shape_of == "clip" and self.shape_range and not self.mixed:
-            raise RecipeError("recipe option shape_of='clip': mixed clips get the shapes, so mixed > 0")
+            raise ValueError("recipe option shape_of='clip': mixed clips get the shapes, so mixed > 0")
         if self.shape_share > 1.0:
-            raise RecipeError(f"recipe option shape_share={self.shape_share}: a share, so at most 1")
+            raise ValueError(f"recipe option shape_share={self.shape_share}: a share, so at most 1")
         for option in ("learning_rate", "adam_epsilon", "output_scale", "spike"):
             if not getattr(self, option) > 0:
-                raise RecipeError(f"recipe option {option}={getattr(self, option)}: must be above zero")
-
-    def as_dict(self) -> dict[str, Any]:
-        """Return plain values, for a model file or run.json."""
-        return asdict(self)
+                raise ValueError(f"recipe option {option}={getattr(self, option)}: must be above zero")
 
     @classmethod
     def from_dict(cls, values: dict[str, Any]) -> Recipe:
-        """Make a recipe from `as_dict`. Raises RecipeError for an unknown or missing option."""
+        """Make a recipe from its fields. Raises ValueError for an unknown or missing one."""
         values = {f.name: f.default for f in fields(cls) if f.metadata.get("added")} | values
         if differing := sorted(values.keys() ^ {field.name for field in fields(cls)}):
-            raise RecipeError(f"recipe option {differing[0]!r} is unknown or missing")
+            raise ValueError(f"recipe option {differing[0]!r} is unknown or missing")
         return cls(**{**values, "terms": tuple(values["terms"])})
 
 

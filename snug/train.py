@@ -170,7 +170,7 @@ def print_summary(model: TrainedModel) -> None:
         if window["action"] != "gradient clipped":  # which is part of the recipe
             print("step {step}: {window} at {joules} {unit}, {action}".format(**window, unit=model.unit))
     print(f"{model.steps} steps in {model.seconds:.0f} s after {model.setup_seconds:.0f} s of preparation, "
-          f"{model.megabytes:.1f} MB")  # fmt: skip
+          f"{model.network.megabytes:.1f} MB")  # fmt: skip
 
 
 if __name__ == "__main__":

@@ -32,8 +32,10 @@ if TYPE_CHECKING:
 CHARACTERS = r"\w+.-"  # of a name, as a class of a regular expression
 MODULE = "benchmarks.methods.outside:make_stored"
 PLACE = "{scene}"  # in a path: the scene's name, its slashes as hyphens
-FIRST = 0.15  # of the cloth's diagonal: a first frame lies nearer than that to the scene's cloth
-FARTHEST = 0.25  # of the cloth's diagonal: its centre stays nearer than that to where the body carries it
+# Share of the cloth's diagonal by which a first frame lies at most from the scene's cloth.
+FIRST = 0.15
+# Share of the cloth's diagonal by which its centre stays near where the body carries it.
+FARTHEST = 0.25
 RATE_TOLERANCE = 1e-4  # of a frame rate: people write it with some digits
 
 

@@ -53,15 +53,12 @@ The zero of gravity's energy in a frame is origin_heights of scene.json, the hei
 Contact: a sample of the cloth touches only faces of the body near its own place at rest:
 those whose centroid at rest lies within {contact_region_m} m of the sample's.
 
-"""
-SCORED = """\
 Write positions (T,V,3) of all frames, the start included, as mine.npz:
   numpy.savez('mine.npz', positions=positions, fps={rate})
 and have them scored, with the --set, --garment, --body and --motions of the export:
   python -m benchmarks.score mine.npz --scene {scene}
 quasi_static=(T,V,3), the answer to each pose held still, adds the method's own dynamics.
 """
-NOT_SCORED = "The scene is for networks of benchmarks.run alone: no roll-out of a file is scored.\n"
 
 
 def write_scene_files(part: Path, scene: BuiltScene, facts: dict[str, Any]) -> None:
@@ -146,11 +143,9 @@ def write_scene(
     The trajectory of `simulation` is written too, and what the method `reader` reads in a folder of its name.
 
     Raises:
-        ValueError: where a simulation is asked for of a scene for networks alone, or a reader's has no body.
+        ValueError: where a reader's scene has no body.
         RuntimeError: where the garment does not settle.
     """
-    if simulation is not None and declared.networks_only:
-        raise ValueError(f"--reference: nobody simulates {declared.name}: it is for networks alone")
     with new_folder(folder) as part:
         facts = facts_of(scene) | {
             "description": declared.description, "preset": preset, "garment": declared.garment,
@@ -165,6 +160,5 @@ def write_scene(
             trajectory.save(part / "reference.vtkhdf")
             positions, faces = trajectory.positions, trajectory.faces
             np.savez(part / "reference.npz", positions=positions, faces=faces, fps=1.0 / scene.dt)
-        text = README + (NOT_SCORED if declared.networks_only else SCORED)
         rate = np.format_float_positional(facts["fps"], trim="-")  # all digits: a roll-out is held to it
-        (part / "README.txt").write_text(text.format(rate=rate, **facts), encoding="utf-8")
+        (part / "README.txt").write_text(README.format(rate=rate, **facts), encoding="utf-8")

@@ -40,7 +40,7 @@ METHODS = (
 def find_method(name: str) -> MethodEntry:
     """Return the entry of that name. Raises KeyError.
 
-    >>> find_method("newton-4").reporting.level
+    >>> find_method("newton-4").level
     4
     """
     return by_name("method", METHODS)[name]

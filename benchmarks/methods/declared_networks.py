@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from benchmarks.method import MethodEntry, Reporting, Simulated, Training
+from benchmarks.method import MethodEntry, Simulated, Training
 from snug.kinds import KINDS
 from snug.named_recipes import (
     ABLATIONS,
@@ -55,7 +55,7 @@ def network(
         pairing_group: shared by methods compared seed by seed; its own name by default.
         fields: other fields of MethodEntry, in place of those of a network.
 
-    >>> network("snug-windy", "SNUG, windy", "SNUG, trained in a wind", base="snug").reporting.pairing_group
+    >>> network("snug-windy", "SNUG, windy", "SNUG, trained in a wind", base="snug").pairing_group
     'snug-windy'
     """
     usual: dict[str, Any] = {
@@ -68,7 +68,8 @@ def network(
         "batched": True,
         "gives_first_frame": True,
         "role": "network",
-        "reporting": Reporting(base=base, pairing_group=pairing_group or name),
+        "base": base,
+        "pairing_group": pairing_group or name,
     }
     return MethodEntry(
         name=name, label=label or KINDS[name].label, description=description, **usual | fields
@@ -110,7 +111,7 @@ POST_PROCESSED = tuple(
         entry, name=f"{entry.name}+cleanup", label=f"{entry.label}, post-processed", batched=False,
         description=f"{entry.name}, then vertices within 2 mm of the skin pushed out; both are timed",
         options={"kind": entry.name, "cleanup": True},
-        reporting=Reporting(base=entry.name, pairing_group=entry.reporting.pairing_group),
+        base=entry.name,
     )
     for entry in NAMED
     if entry.name in ("snug", "supervised", "supervised-vertices")

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from benchmarks.method import MethodEntry, Reporting
+from benchmarks.method import MethodEntry
 
 SHIFTS = (1e-9, 3e-9, 1e-8, 1e-7, 1e-6, 1e-5, 3e-5, 1e-4)  # [m]
 PERTURBED = "benchmarks.methods.reference_variants:make_perturbed_start"
@@ -18,7 +18,7 @@ def _declare_variant(
     return MethodEntry(
         name=f"simulation-{name}", label=f"Simulation{label}", description=f"the reference{description}",
         module=module, options=options, role="reference-variant", timed=timed,
-        reporting=Reporting(family=f"simulation-{family}", level=level),
+        family=f"simulation-{family}", level=level,
     )  # fmt: skip
 
 
@@ -37,7 +37,8 @@ def _truncate(
             dtype=dtype,
             truncated=True,
             role="solver",
-            reporting=Reporting(family=family, level=count),
+            family=family,
+            level=count,
         )
         for count in counts
     )
@@ -58,9 +59,10 @@ def _warm_started(base: str, label: str, solver: str) -> tuple[MethodEntry, ...]
             seeded=trained is not None,
             truncated=True,
             role="warm-started",
-            reporting=Reporting(
-                family=f"{base}+{solver}", level=count, base=base, pairing_group=trained or ""
-            ),
+            family=f"{base}+{solver}",
+            level=count,
+            base=base,
+            pairing_group=trained or "",
         )
         for count in (1, 2, 4, 8)
     )

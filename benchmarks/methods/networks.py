@@ -22,12 +22,7 @@ from benchmarks.scene import BuiltScene
 from reference_sim.geometry.surface import vertex_normals
 from reference_sim.trajectory import Trajectory
 from snug.networks.dressed_body import DressedBody
-from snug.networks.roll_out import (
-    prepare_batch,
-    prepare_frame_inputs,
-    prepare_roll_out,
-    roll_out,
-)
+from snug.networks.roll_out import prepare_batch, prepare_frame_inputs, prepare_roll_out, roll_out
 from snug.networks.trained_model import TrainedModel
 from snug.trained import list_networks
 from snug.training.contact_cache import Patch

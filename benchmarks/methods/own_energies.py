@@ -12,7 +12,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from benchmarks.declarations import load
-from benchmarks.method import MethodEntry, Reporting, Training
+from benchmarks.method import MethodEntry, Training
 from benchmarks.methods.declared_networks import TRAININGS
 from snug.kinds import KINDS
 from snug.recipe import DEFAULT, Recipe
@@ -87,7 +87,7 @@ def find_own_reference(entry: MethodEntry) -> MethodEntry | None:
         needs_body=True,
         timed=False,
         role="ablation",
-        reporting=Reporting(base="simulation"),
+        base="simulation",
     )
 
 

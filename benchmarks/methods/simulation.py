@@ -52,7 +52,7 @@ class Simulation(Method):
 
     def run(self) -> Trajectory:
         """Simulate all frames, with the solver as it was when it was set up."""
-        self.stepper.start_again()
+        self.stepper.minimiser.start_again()
         # Hours at the paper's scale: a bar with the time left, a microsecond of a frame's milliseconds.
         # Once: short runs are done again until enough time is measured.
         label = self.scene.name if self.scene.dressed and not self.announced else None

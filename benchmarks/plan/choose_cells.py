@@ -59,7 +59,7 @@ def choose_cells(read: ReadStudy) -> tuple[tuple[Cell, ...], tuple[Case, ...]]:
     if not (chosen or cases):
         raise StudyError(
             f"nothing to run: no such scene meets such a method in part{'s' * (len(study.parts) > 1)} "
-            f"{', '.join(study.parts)}; see --list, or name another study"
+            f"{', '.join(study.parts)} (some are for networks alone); see --list, or name another study"
         )
     stored = roll_out_cells(study, tuple(chosen.values()), read.methods)
     # The reference first: an error against it can be said as soon as another cell is done.

@@ -62,11 +62,6 @@ class Network:
         """The training, as declared."""
         return self.users_training or TRAININGS[self.name]
 
-    @property
-    def packaged(self) -> str:
-        """Name of the network of the package that it is; empty: it is trained, or of another run."""
-        return self.training.packaged
-
 
 @dataclass(frozen=True, kw_only=True)
 class Plan:

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import MISSING, asdict, dataclass, field, fields, is_dataclass, replace
 from pathlib import Path
 from types import UnionType
-from typing import Any, Literal, NoReturn, TypeVar, get_args, get_origin, get_type_hints
+from typing import Any, Literal, NoReturn, get_args, get_origin, get_type_hints
 
 from benchmarks.assets import FEWEST_FRAMES, LIBRARY
 from benchmarks.external.roll_out_files import RollOutOption
@@ -24,14 +24,8 @@ from snug.trained import FOLDER
 PARTS = ("garments", "speed", "validation", "extremes", "shapes")  # that reports know
 
 
-COUNTS = (  # fields of sizes
-    "garment_vertices",
-    "train_motions",
-    "test_motions",
-    "clip_frames",
-    "sheet_cells",
-    "repeats",
-)
+# Fields of sizes.
+COUNTS = ("garment_vertices", "train_motions", "test_motions", "clip_frames", "sheet_cells", "repeats")
 
 
 class StudyError(ValueError):
@@ -143,6 +137,8 @@ class Study:
             seeds = ",".join(map(str, self.seeds))[:40]
             remedy = "at least one whole number, none below 0 or beyond 63 bits"
             raise StudyError(f"seeds: '{seeds}': give {remedy}")
+        if len(set(self.seeds)) < len(self.seeds):
+            raise StudyError(f"seeds: {self.seeds}: give each once")
         if self.sizes.frames < FEWEST_FRAMES:
             raise StudyError(f"sizes.frames: {self.sizes.frames}: give {FEWEST_FRAMES} or more")
         counts = {name: getattr(self.sizes, name) for name in COUNTS}
@@ -172,7 +168,6 @@ WORDS_FOR_TABLES = {"garment": "path", "sizes": "base"}
 PATHS = ("body", "trained", "motions", "path", "material")  # fields that hold paths
 KINDS = {str: "text", int: "a whole number", float: "a number", bool: "true or false"}
 Table = Mapping[str, Any]
-Record = TypeVar("Record")
 
 
 def read_study(word: str = "full", options: Sequence[Table] = ()) -> Study:
@@ -203,14 +198,13 @@ def read_study(word: str = "full", options: Sequence[Table] = ()) -> Study:
     return replace(study, written={"name": word, **table})
 
 
-def read_fields(kind: type[Record], path: Path) -> Record:
+def read_fields(kind: type, path: Path) -> Any:
     """Return an object of a dataclass from a TOML file. Raises StudyError with file, line and field."""
     table = _read_table(path)
     try:
-        record: Record = _dataclass_of(kind, table)
+        return _dataclass_of(kind, table)
     except StudyError as error:
         raise StudyError(f"{path}: {_line_of(path, str(error).partition(':')[0])}{error}") from None
-    return record
 
 
 def find_study(name: str) -> Path:
@@ -246,7 +240,7 @@ def _line_of(path: Path, field: str) -> str:
     A field within a table on one line has that line.
     """
     lines, header = dict[str, int](), ""
-    for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1):
+    for number, line in enumerate(path.read_text("utf-8", errors="replace").splitlines(), 1):
         name = re.split("[=#]", line)[0].replace('"', "").strip()
         if name.startswith("["):
             name = header = name.strip("[] ")

@@ -118,16 +118,6 @@ class Row:
         return ResultsError(f"row {self.scene} x {self.method} / {self.metric}: {problem}")
 
     @property
-    def passed(self) -> bool:
-        """True where the row counts as fine: ok, or skipped with its reason."""
-        return self.status in ("ok", "skipped")
-
-    @property
-    def declared(self) -> bool:
-        """True where the value is a run time that its author declared."""
-        return self.reason == DECLARED
-
-    @property
     def pretrained(self) -> str:
         """Remark on the row's network where it is of a file; empty where there is none or it was trained."""
         remark = re.search(rf"(?:^|; )({PRETRAINED} .*)", self.reason)

@@ -10,7 +10,7 @@ import math
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from benchmarks.method import Method
+from benchmarks.method import Method, MethodEntry
 from benchmarks.plan.cell import Cell
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.task import Context, Needed, Outcome, failure
@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
 STATUSES = ("converged", "ok", "stalled", "diverged", "timeout")  # of a trajectory
 BATCH = 16  # bodies at once, where a method can
-INPUTS = 0.1  # of the time measured of a run, for its inputs: a few equal milliseconds a frame
+# Share of a run's measured time for its inputs: a few equal milliseconds a frame.
+INPUTS = 0.1
 UNBELIEVABLE = "its time cannot be believed: "
 
 
@@ -107,10 +108,7 @@ def compute_cell(cell: Cell, min_time: float, context: Context) -> Outcome:
         inputs = time_inputs(method, scene, min_time=INPUTS * min_time)
         result |= times(cell, reading, frames) | {"inputs": inputs.seconds}
         reading = replace(reading, complaint=reading.complaint or inputs.complaint)
-    entry = cell.entry
-    status, reason = judge(
-        trajectory, reading, scene, truncated=entry.truncated, other_mesh=entry.other_mesh
-    )
+    status, reason = judge(trajectory, reading, scene, cell.entry)
     if status == "failed":
         return Outcome(status, reason, failed=True, result={"peak": peak})
     paths = [folder.trajectory_path(*cell.key)]
@@ -186,18 +184,13 @@ def time_inputs(method: Method, scene: BuiltScene, *, min_time: float) -> Readin
 
 
 def judge(
-    trajectory: Trajectory,
-    reading: Reading,
-    scene: BuiltScene,
-    *,
-    truncated: bool,
-    other_mesh: bool = False,
+    trajectory: Trajectory, reading: Reading, scene: BuiltScene, entry: MethodEntry
 ) -> tuple[str, str]:
     """Return status and reason of a row, by what the trajectory says and holds, and the clock."""
     import numpy as np
 
     reason = " ".join(trajectory.reason.split())
-    if fault := misshapen(trajectory.positions, scene, other_mesh=other_mesh):
+    if fault := misshapen(trajectory.positions, scene, other_mesh=entry.other_mesh):
         return "failed", f"run() {fault}"
     if reading.complaint:
         return "failed", UNBELIEVABLE + reading.complaint
@@ -207,12 +200,12 @@ def judge(
         ended = "timeout" if trajectory.status == "timeout" else "diverged"
         return ended, reason or f"ended after {trajectory.frames} of {scene.frames} frames"
     if trajectory.status == "max_iterations":
-        return ("ok", "") if truncated else ("stalled", reason)
+        return ("ok", "") if entry.truncated else ("stalled", reason)
     if trajectory.status not in STATUSES:
         names = ", ".join(STATUSES)
         return "failed", f"unknown status '{trajectory.status}', use one of {names}; {reason}"
     status = "ok" if trajectory.status == "converged" else trajectory.status
-    if status != "ok" and not truncated and "converged" in trajectory.frame_fields:
+    if status != "ok" and not entry.truncated and "converged" in trajectory.frame_fields:
         bad = int((trajectory.frame_fields["converged"] < 0.5).sum())
         reason = f"{bad} of {trajectory.frames} frames did not converge; {reason}"
     return status, reason

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from snug.motion.motion import Motion
 
 
-GRID = 2.0**13  # places to a metre of the body in its file, which is for the eye: half the size again
+# Places to a metre of the body in its file, which is for the eye: half the size again.
+GRID = 2.0**13
 
 
 def settle_start(scene: Scene, context: Context, needed: Needed) -> Outcome:

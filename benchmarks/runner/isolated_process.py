@@ -31,7 +31,8 @@ if TYPE_CHECKING:
 
     from benchmarks.assets import Assets
 
-PATIENCE = 2.0  # [s] for an idle process to clean up behind itself: semaphores, as of progress bars
+# Time for an idle process to clean up behind itself: semaphores, as of progress bars.
+PATIENCE = 2.0  # [s]
 # [s] for what a process does before its first task: it may have to compile every kernel
 COMPILING = 900.0
 # What every process loads. Nothing that a scene may do without: not torch, not what a body is asked with.

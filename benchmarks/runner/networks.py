@@ -70,7 +70,7 @@ class NetworkTraining:
 
     def files(self, folder: RunFolder) -> tuple[str, ...]:
         """Return the name of the model's file in the folder; none of the package's, which stays there."""
-        return () if self.network.packaged else (folder.relative(self.path(folder)),)
+        return () if self.training.packaged else (folder.relative(self.path(folder)),)
 
 
 def train(job: NetworkTraining, context: Context, needed: Needed) -> Outcome:
@@ -125,7 +125,7 @@ def _outcome(model: TrainedModel, job: NetworkTraining, run: RunFolder, facts: d
         "frames": model.summary.get("training_frames", 0),
         "seconds": model.seconds,
         "setup_seconds": model.setup_seconds,
-        "megabytes": model.megabytes,
+        "megabytes": model.network.megabytes,
         "steps": model.steps,
         **{name: model.summary[name] for name in INCIDENTS if name in model.summary},
         "last": dict(model.history[-1]) if model.history else {},
@@ -182,7 +182,7 @@ def find_pretrained(job: NetworkTraining, folder: Path) -> tuple[Path | None, st
     Where there is none, or one of another training (of a packaged one: of another body or garment), why it
     cannot be taken.
     """
-    packaged = job.network.packaged
+    packaged = job.training.packaged
     name = network_name(packaged or job.network.name, job.network.garment, job.network.seed)
     places = (folder / f"{name}{SUFFIX}", job.path(RunFolder(folder)))
     path = next((path for path in places if path.is_file()), None)

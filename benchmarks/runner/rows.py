@@ -79,8 +79,8 @@ def rows_of_cell(
         status=status if status != "ok" else "failed", reason=reason, terms=outcome.result.get("terms", ""),
         **_origin(outcome, protocol_of(cell, plan)),
         dtype=entry.dtype, garment=scene.garment, motion=scene.motion, part=scene.part,
-        family=entry.reporting.family or entry.name, level=entry.reporting.level, role=entry.role,
-        base=entry.reporting.base, seeded=entry.seeded, pairing_group=entry.reporting.pairing_group,
+        family=entry.family or entry.name, level=entry.level, role=entry.role, base=entry.base,
+        seeded=entry.seeded, pairing_group=entry.pairing_group,
     )  # fmt: skip
     machines = machines_of(network, taught_by)
     of_metrics = [_row(base, status, cell.entry, *item, plan.metrics) for item in metrics.items()]

@@ -15,7 +15,7 @@ from benchmarks.plan.plan import Plan
 from benchmarks.provenance import digest, digest_of_file
 from benchmarks.results import run_folder
 from benchmarks.results.protocol import DIGEST, NUMBER
-from benchmarks.results.row import Row
+from benchmarks.results.row import DECLARED, Row
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
 from benchmarks.runner.loop import Runner
@@ -144,7 +144,7 @@ def describe_plan(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
         scene.name: {"description": scene.description, "role": plan.motions.role_of(scene.motion)}
         for scene in plan.scenes
     }
-    remarks = {row.method: "declared time" for row in rows if row.declared}
+    remarks = {row.method: "declared time" for row in rows if row.reason == DECLARED}
     remarks |= {row.method: "pretrained" for row in rows if row.pretrained}
     of_methods = {
         name: {

@@ -85,7 +85,8 @@ def users_code(*homes: str) -> tuple[str, ...]:
 TRAINED = "training"  # the stage of networks that no file has
 # cells of one scene whose processes wait for their repeats: each holds some hundred megabytes
 AT_ONCE = 8
-TOGETHER = 12  # cells of one scene that a process measures, beside those that they are compared with
+# Cells of one scene that a process measures, beside those that they are compared with.
+TOGETHER = 12
 
 
 def tasks_of(plan: Plan) -> list[Task]:
@@ -175,7 +176,7 @@ class Schedule:
         A network of a user's file is trained all the same, unless its file is there.
         """
         job, folder = self.training(network), self.plan.study.trained
-        folder = FOLDER if network.packaged else folder
+        folder = FOLDER if job.training.packaged else folder
         fields: dict[str, Any] = {
             "kind": "network", "name": network.task_id[1], "label": network.label, "silent": True,
             "files": job.files(self.folder),
@@ -196,9 +197,10 @@ class Schedule:
     def training(self, network: Network) -> NetworkTraining:
         """Return how a network is trained."""
         motions, chosen = self.plan.motions.train, network.training.at(self.preset)
-        steps = self.preset.steps_of(network.name, chosen.kind)
+        of_kind = self.preset.steps.get(chosen.kind, 0)
+        steps = self.preset.steps.get(network.name, of_kind)
         inputs = self._machine(self.plan.study.device) | self._list_body(network.garment)
-        if network.packaged:  # of the package's training clips, which are whole
+        if chosen.packaged:  # of the package's training clips, which are whole
             inputs["assets"]["train_frames"] = find_preset("quick").train_frames
         else:
             inputs |= {
@@ -293,9 +295,7 @@ class Schedule:
             reads = (*reads, id_of("quasi-static", scene))
         key = (scene.counterpart, cell.method, cell.seed)
         reads += tuple(c.id() for c in plan.cells if (c.scene.name, c.method, c.seed) == key)
-        method = [
-            entry.role, entry.reporting.family, entry.reporting.level, entry.static_known, entry.other_mesh,
-        ]  # fmt: skip
+        method = [entry.role, entry.family, entry.level, entry.static_known, entry.other_mesh]
         run = partial(measure_cell, cell, cells, self.preset.gap_samples, plan.metrics)
         part = cells.index(cell) % math.ceil(len(cells) / TOGETHER)
         return Task(

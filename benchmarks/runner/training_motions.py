@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from benchmarks.plan.options import study_of
-from benchmarks.plan.plan import Network, Plan, make_plan
+from benchmarks.plan.plan import Network, make_plan
 from benchmarks.plan.study import StudyError
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
@@ -23,18 +23,17 @@ from snug.training.simulated_data import write_data_set
 LEARNER = "supervised-vertices"
 
 
-def plan_training_motions(garment: str, options: argparse.Namespace) -> Plan:
-    """Return the plan of a run that simulates the training motions. Raises ValueError, one line."""
-    study = study_of(options, "full:garments")
-    return make_plan(replace(study, scenes=(f"{garment}/*",), methods=(LEARNER,)))
-
-
-def write_training_motions(garment: str, plan: Plan, out: Path) -> list[str]:
+def write_training_motions(garment: str, options: argparse.Namespace, out: Path) -> list[str]:
     """Simulate what the folder `out`.parts lacks, write the file and remove the folder; return the motions.
 
     Raises StudyError where a simulation failed, or did not reach its last frame.
     """
-    run, assets = RunFolder(out.with_name(f"{out.name}.parts")), plan.open_assets()
+    study = study_of(options, "full:garments")
+    run = RunFolder(out.with_name(f"{out.name}.parts"))
+    plan = make_plan(
+        replace(study, scenes=(f"{garment}/*",), methods=(LEARNER,)), folder=run.path / "new"
+    )
+    assets = plan.open_assets()
     schedule, network = Schedule(plan), Network(LEARNER, 0, garment)
     with held(run.path):
         run.remove_parts()

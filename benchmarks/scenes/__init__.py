@@ -30,7 +30,8 @@ SCENES = (
 )  # fmt: skip
 
 # Scenes besides the test motions leave costs out: nothing is timed there, and several run side by side.
-WALK = "walk"  # made by code, without a role; walks of recordings train: what breaks here breaks next to them
+# Made by code, without a role; walks of recordings train: what breaks here breaks next to them.
+WALK = "walk"
 ORDINARY = "out_of_distribution/ordinary"
 
 

@@ -32,8 +32,10 @@ if TYPE_CHECKING:
     from benchmarks.presets import Dependence
     from snug.body.parametric_body import Body
 
-FALLEN = 0.3  # [m] from where the body carries it: a piece has fallen off whose vertices are all as far
-HOLD = 0.5  # frames of stillness after the limbs have arrived, as a share of those of the approach
+# A piece has fallen off whose vertices are all as far from where the body carries them.
+FALLEN = 0.3  # [m]
+# Frames of stillness after the limbs have arrived, as a share of those of the approach.
+HOLD = 0.5
 DISTANCE, STIFFNESS = 1e-3, 100.0  # of self-contact: [m], two thicknesses of the cloth; [Pa]
 SHORT = 0.25  # share of a motion's frames that is left out at most
 
@@ -78,11 +80,7 @@ def build_dressed_body(
 def dress(scene: Scene, dressed: Dressed, **fields: Any) -> BuiltScene:
     """Return the scene of a garment on a moving body, with further fields of BuiltScene."""
     return BuiltScene(
-        name=scene.name,
-        dressed=dressed,
-        origin_heights=dressed.pelvis[:, 1],
-        **_pose(dressed),
-        **fields,
+        name=scene.name, dressed=dressed, origin_heights=dressed.pelvis[:, 1], **_pose(dressed), **fields
     )
 
 

@@ -21,7 +21,8 @@ from reference_sim.obstacle import Obstacle
 
 FPS = 30.0  # where neither the file nor the user says another rate
 LARGEST, GARMENT = 20.0, (0.2, 4.0)  # [m] across: of any cloth; from and to, of one that is worn
-LONGEST_STRETCH = 3.0  # times as long as at rest, edges in the mean: their vertices are no neighbours
+# Vertices are no neighbours whose edges are in the mean so many times as long as at rest.
+LONGEST_STRETCH = 3.0
 MIN_FRAMES = 4  # frames: two are not judged, and a mean is of more than one
 
 

@@ -27,7 +27,8 @@ from benchmarks.meshes import ROW, rectangle
 from benchmarks.validation.equilibrium import flat_cloth
 from reference_sim import energies
 
-ROWS = 2  # cells across a strip: narrow, so that the cross-section never has to stay flat
+# Cells across a strip: narrow, so that the cross-section never has to stay flat.
+ROWS = 2
 
 
 @cache

@@ -20,14 +20,7 @@ import numpy as np
 import reference_sim as sim
 from benchmarks.meshes import in_space, jittered_patch, random_rotation
 from benchmarks.validation.case import known_answer
-from benchmarks.validation.equilibrium import (
-    COTTON,
-    DeadLoad,
-    border,
-    fit_order,
-    flat_cloth,
-    minimum,
-)
+from benchmarks.validation.equilibrium import COTTON, DeadLoad, border, fit_order, flat_cloth, minimum
 from reference_sim import energies
 
 IDENTITY = np.eye(2)[:, :, None, None]

@@ -11,11 +11,7 @@ import numpy as np
 
 import reference_sim as sim
 from benchmarks.validation.case import known_answer
-from benchmarks.validation.equilibrium import (
-    farthest,
-    motion,
-    order,
-)
+from benchmarks.validation.equilibrium import farthest, motion, order
 from reference_sim import energies
 
 SOFT = sim.Material(young_modulus=7e3)

@@ -84,7 +84,9 @@ class BendHinge(Energy):
         n2 = torch.linalg.cross(u[..., 3, :] - u[..., 0, :], e)
         sine = (torch.linalg.cross(n1, n2) * e).sum(-1) / torch.linalg.vector_norm(e, dim=-1)
         theta = torch.atan2(sine, (n1 * n2).sum(-1))
-        return 0.5 * stiffness * _wrap(theta - rest) ** 2
+        # In [-pi, pi): a hinge past half a turn is nearer from the other side.
+        turn = torch.remainder(theta - rest + np.pi, 2 * np.pi) - np.pi
+        return 0.5 * stiffness * turn**2
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
@@ -97,13 +99,6 @@ class BendHinge(Energy):
             x, self.stencils, self.stiffness, self.rest_angles, convexity, places.slots, places.base,
             places.stride, data,
         )  # fmt: skip
-
-
-def _wrap(angle):
-    """Return the same angle in [-pi, pi): a hinge past half a turn is nearer from the other side."""
-    import torch
-
-    return torch.remainder(angle + np.pi, 2 * np.pi) - np.pi
 
 
 @njit(cache=True, inline="always", error_model="numpy")

@@ -30,8 +30,10 @@ if TYPE_CHECKING:
     import scipy.sparse as sp
 
 DEFAULT_DISTANCE = 2e-3  # [m]
-DEFAULT_STIFFNESS = 1e2  # [Pa]; measured: a tenth of it saves nothing, a hundred times it doubles Newton
-LONGEST_STEP = 0.05  # [m] of a vertex in a line search: a step of a metre would meet nearly every pair
+# Measured: a tenth of it saves nothing, a hundred times it doubles Newton.
+DEFAULT_STIFFNESS = 1e2  # [Pa]
+# Step of a vertex in a line search: one of a metre would meet nearly every pair.
+LONGEST_STEP = 0.05  # [m]
 
 
 class ContactBarrier(Energy):
@@ -42,7 +44,7 @@ class ContactBarrier(Energy):
     """
 
     name = "barrier"
-    dynamic = joins_late = True
+    dynamic = True
 
     def __init__(
         self, cloth: Cloth, *, distance: float = DEFAULT_DISTANCE, stiffness: float = DEFAULT_STIFFNESS

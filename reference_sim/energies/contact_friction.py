@@ -112,9 +112,7 @@ class ContactFriction(Energy):
         state = (self._demand_forces(), self.anchors, self.normals, self.threshold)
         return _gradient(x, self.stencils, self.weights, *state, gradient), gradient
 
-    def active_hessian_blocks(
-        self, x: np.ndarray, convexity: float = 0.0
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def active_hessian_blocks(self, x: np.ndarray, convexity: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the samples (n,) with second derivatives, and these (n, 9, 9) [N/m]; see Energy."""
         forces = self._demand_forces()
         elements = np.flatnonzero(forces)

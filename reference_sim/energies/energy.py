@@ -7,6 +7,7 @@ tests/reference_sim/energies/test_derivatives.py holds every override to the def
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
@@ -43,7 +44,7 @@ DERIVATIVES = (
 def demand_positive(term: str, *, or_zero: bool = False, **numbers: float) -> None:
     """Raise ValueError unless all numbers of the term so named are finite and above 0."""
     for name, value in numbers.items():
-        if not (np.isfinite(value) and (value > 0 or (or_zero and value == 0))):
+        if not (math.isfinite(value) and (value > 0 or (or_zero and value == 0))):
             bound = "at least 0" if or_zero else "above 0"
             raise ValueError(f"{term} {name} = {value!r}: must be a finite number {bound}")
 
@@ -53,13 +54,12 @@ class Energy:
 
     Attributes:
         dynamic: True where the vertices that the term couples change with x, as the pairs of a contact
-            do. Such a term has no stencils (N = 0); it gives `sparse_hessian` instead of blocks.
+            do. Such a term has no stencils (N = 0); it gives `sparse_hessian` instead of blocks. A step
+            is minimised without it first, for it is zero wherever nothing is near.
         constant: block sizes (3: Hessian, 1: scalar stiffness) of which the term gives the same at every
             x and in every step.
         remembers: whether `prepare` reads what the step before has left. Where no term does, a step can
             be judged without preparing the one before it.
-        joins_late: whether a step is minimised without the term first, and goes on with it by a way
-            without a collision. It is zero wherever nothing is near, so most steps end without it.
         kernels: functions by use, see kernels.fast_kernels. A subclass does not inherit them.
     """
 
@@ -69,7 +69,6 @@ class Energy:
     dynamic: bool = False
     constant: tuple[int, ...] = ()
     remembers: bool = False
-    joins_late: bool = False
     kernels: ClassVar[Mapping[str, Callable[[Any], Any]]] = {}
 
     def __init_subclass__(cls, **options: Any) -> None:
@@ -141,9 +140,7 @@ class Energy:
         zero = torch.zeros_like(u)
         return torch.stack([(zero if r is None else r).flatten(-2) for r in rows], dim=1).numpy()
 
-    def active_hessian_blocks(
-        self, x: np.ndarray, convexity: float = 0.0
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def active_hessian_blocks(self, x: np.ndarray, convexity: float) -> tuple[np.ndarray, np.ndarray]:
         """Return elements (n,) with a Hessian at x (V, 3) [m] and their blocks (n, 3k, 3k) [N/m].
 
         convexity: share of the negative curvature that is taken out: 0 gives the true second derivatives,

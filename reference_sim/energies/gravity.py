@@ -63,8 +63,6 @@ class Gravity(Energy):
         gradient[:, 1] = self.weights
         return float(self.weights @ (x[:, 1] - self.origin_height)), gradient
 
-    def active_hessian_blocks(
-        self, x: np.ndarray, convexity: float = 0.0
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def active_hessian_blocks(self, x: np.ndarray, convexity: float) -> tuple[np.ndarray, np.ndarray]:
         """Return no blocks: the energy is linear."""
         return np.arange(0), np.zeros((0, 3, 3))

@@ -47,9 +47,7 @@ class StretchSpring(Energy):
         gradient = np.zeros_like(x)
         return _gradient(x, self.stencils, self.rest_lengths, self.stiffness, gradient), gradient
 
-    def active_hessian_blocks(
-        self, x: np.ndarray, convexity: float = 0.0
-    ) -> tuple[np.ndarray, np.ndarray]:
+    def active_hessian_blocks(self, x: np.ndarray, convexity: float) -> tuple[np.ndarray, np.ndarray]:
         """Return +-2k [n n^T + (1 - l0/l)(I - n n^T)], see Energy.
 
         A spring shorter than l0 is negative across itself.

@@ -198,37 +198,31 @@ def hat(D, corner):
 
 @njit(cache=True, error_model="numpy", forceinline=True)
 def _add_block(data, x, v, g, H, scratch):
-    """Add gradient and convex block of vertex v."""
-    first, corners, membrane = data[0], data[1], data[2:]
-    fa, fb = scratch[0], scratch[1]
-    for at in range(first[v], first[v + 1]):
-        _add_strain(x, corners[at] // 3, corners[at] % 3, membrane, g, H, fa, fb)
-    return 0.0
-
-
-@njit(cache=True, inline="always")
-def _add_strain(x, e, corner, membrane, g, H, fa, fb):
-    """Add A F S b to g and A [(b.S+ b) I + (lambda + mu) (F b)(F b)^T + mu |b|^2 F F^T] to H.
+    """Add A F S b to g and A [(b.S+ b) I + (lambda + mu) (F b)(F b)^T + mu |b|^2 F F^T] to H, of vertex v.
 
     S+ is S without compression.
     """
-    faces, Dm_inverse, areas, lam, mu = membrane
-    G00, G11, G01 = strain(x, faces[e], Dm_inverse[e], fa, fb)
-    trace = lam * (G00 + G11)
-    S00, S11, S01 = trace + 2.0 * mu * G00, trace + 2.0 * mu * G11, 2.0 * mu * G01
-    b0, b1 = hat(Dm_inverse[e], corner)
-    s0, s1 = S00 * b0 + S01 * b1, S01 * b0 + S11 * b1
-    P00, P11, P01 = _drop_compression(S00, S11, S01)
-    along = b0 * (P00 * b0 + P01 * b1) + b1 * (P01 * b0 + P11 * b1)
-    bb = b0 * b0 + b1 * b1
-    area = areas[e]
-    for i in range(3):
-        g[i] += area * (fa[i] * s0 + fb[i] * s1)
-        Fi = fa[i] * b0 + fb[i] * b1
-        H[i, i] += area * along
-        for j in range(3):
-            Fj = fa[j] * b0 + fb[j] * b1
-            H[i, j] += area * ((lam + mu) * Fi * Fj + mu * bb * (fa[i] * fa[j] + fb[i] * fb[j]))
+    first, corners, faces, Dm_inverse, areas, lam, mu = data
+    fa, fb = scratch[0], scratch[1]
+    for at in range(first[v], first[v + 1]):
+        e = corners[at] // 3
+        G00, G11, G01 = strain(x, faces[e], Dm_inverse[e], fa, fb)
+        trace = lam * (G00 + G11)
+        S00, S11, S01 = trace + 2.0 * mu * G00, trace + 2.0 * mu * G11, 2.0 * mu * G01
+        b0, b1 = hat(Dm_inverse[e], corners[at] % 3)
+        s0, s1 = S00 * b0 + S01 * b1, S01 * b0 + S11 * b1
+        P00, P11, P01 = _drop_compression(S00, S11, S01)
+        along = b0 * (P00 * b0 + P01 * b1) + b1 * (P01 * b0 + P11 * b1)
+        bb = b0 * b0 + b1 * b1
+        area = areas[e]
+        for i in range(3):
+            g[i] += area * (fa[i] * s0 + fb[i] * s1)
+            Fi = fa[i] * b0 + fb[i] * b1
+            H[i, i] += area * along
+            for j in range(3):
+                Fj = fa[j] * b0 + fb[j] * b1
+                H[i, j] += area * ((lam + mu) * Fi * Fj + mu * bb * (fa[i] * fa[j] + fb[i] * fb[j]))
+    return 0.0
 
 
 @njit(cache=True, inline="always")

@@ -66,7 +66,7 @@ def _read_obj(path: Path) -> Contents:
 def _resolve_index(text: str, count: int) -> int:
     """Return an index from 0 on: OBJ counts from 1, and from the last by -1. Raises ValueError."""
     number = _index(text)
-    if number == 0:
+    if number == 0 or count + number < 0:
         raise ValueError(text)
     return number - 1 if number > 0 else count + number
 

@@ -18,7 +18,8 @@ LANES = 16  # faces of a leaf, leaves of a block and samples of a group
 QUANTITIES = 21  # of a face, for its bound
 BOUND_MATH = {"nnan", "nsz", "reassoc", "contract"}  # for bounds alone, within ROUND_OFF
 ROUND_OFF = 3e-6  # of lengths, of the bounds: some fifty times that of float32
-FLAT = 1e-12  # squared sine of an angle of a triangle, below which its normal is round-off
+# Squared sine of an angle of a triangle, below which its normal is round-off.
+FLAT = 1e-12
 
 # The mesh, faces in the order of L leaves of LANES; the last leaf is filled up with its last face.
 # order (16 L,) and vertices (16 L, 3): face and its vertices, ascending; ascending (16 L, 3): their
@@ -190,7 +191,8 @@ def _face_bounds(leaf, lanes, x, y, z, g, out):
         out[LANES * g + i] = h * h + (side if max(max(s0, s1), s2) > zero else zero)
 
 
-SLIVER = 1e-3  # squared sine of a triangle's first angle, below which all of its sides are tried
+# Squared sine of a triangle's first angle, below which all of its sides are tried.
+SLIVER = 1e-3
 
 
 @njit(cache=True, error_model="numpy")

@@ -6,7 +6,8 @@ import numpy as np
 
 from reference_sim.kernels.kernel_cache import njit
 
-ON_SIDE = 1e-6  # weight of a corner below which a place is on a side; weights may be rounded to float32
+# Weight of a corner below which a place is on a side; weights may be rounded to float32.
+ON_SIDE = 1e-6
 # [m] diameter, of a limb: what the surface is taken for beside the faces that a sample may meet.
 TANGENT_BALL = 0.1
 # cosine to a face, of an offset that leads over it: above the round-off of a foot on a side

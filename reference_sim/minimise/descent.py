@@ -13,7 +13,8 @@ from reference_sim.kernels.kernel_cache import njit
 from reference_sim.material import GRAVITY
 from reference_sim.potential import Potential
 
-LEAST_CURVATURE = 1e-10  # of |s| |y|: pairs of negative curvature would make the estimate indefinite
+# Least share of |s| |y|: pairs of negative curvature would make the estimate indefinite.
+LEAST_CURVATURE = 1e-10
 
 
 def dot(a: np.ndarray, b: np.ndarray) -> float:
@@ -126,12 +127,6 @@ class Result:
     energy: float  # [J] at positions
     terms: dict[str, float]  # [J] of each
     relaxed: bool = False
-
-
-def check_tolerance(tolerance: float) -> None:
-    """Raise ValueError for a tolerance that is no finite number above 0, as every minimiser does."""
-    if not 0.0 < tolerance < float("inf"):
-        raise ValueError(f"tolerance = {tolerance}: give a finite number above 0, in mean vertex weights")
 
 
 SUFFICIENT_DECREASE = 1e-4

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from reference_sim.cholesky import analyse
+from reference_sim.energies.energy import demand_positive
 from reference_sim.kernels.fast_kernels import terms_without_kernel, warn_slow_path
 from reference_sim.minimise.descent import (
     TOLERANCE,
@@ -25,7 +26,6 @@ from reference_sim.minimise.descent import (
     LBFGSHistory,
     Result,
     Stop,
-    check_tolerance,
     iterate,
 )
 from reference_sim.minimise.newton import Newton
@@ -62,7 +62,7 @@ class LBFGS:
     ) -> None:
         self.potential, self.memory = potential, memory
         self.tolerance, self.timeout = tolerance, timeout
-        check_tolerance(tolerance)
+        demand_positive("LBFGS", tolerance=tolerance)
         self.max_iterations = min(PATIENCE, max_iterations) if finish else max_iterations
         small = potential.cloth.vertex_count <= LARGEST_COMPILED
         fast = finish and memory > 0 and small and potential.time_step is not None

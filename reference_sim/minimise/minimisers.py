@@ -96,9 +96,8 @@ class StepMinimiser:
 
     def __init__(self, potential: Potential, **options: Any) -> None:
         self.potential = potential
-        method = "newton" if any(energy.dynamic for energy in potential.energies) else "lbfgs"
-        self.options = {"method": method} | options
-        self._late = [energy for energy in potential.energies if energy.joins_late]
+        self._late = [energy for energy in potential.energies if energy.dynamic]
+        self.options = {"method": "newton" if self._late else "lbfgs"} | options
         self.opening_method, self._ending = "", self.options
         self._opening: Minimiser | None = None
         if self._late:
@@ -107,7 +106,7 @@ class StepMinimiser:
                     "simulate: Newton's method, not a function, ends steps that "
                     f"{self._late[0].name!r} joins: choose method 'lbfgs' or 'newton', or leave the term out"
                 )
-            early = Potential([energy for energy in potential.energies if not energy.joins_late])
+            early = Potential([energy for energy in potential.energies if not energy.dynamic])
             self.opening_method = options.get("method", "lbfgs")
             self._opening = make_minimiser(early, **options | {"method": self.opening_method})
             self._ending = ENDING | {name: options[name] for name in LIMITS if name in options}
@@ -122,24 +121,15 @@ class StepMinimiser:
     def minimise(self, x: np.ndarray, guess: np.ndarray) -> Result:
         """Minimise the step that starts at x (V, 3) [m], from `guess` (V, 3) [m] or from as near as x comes.
 
-        Counts of the result are those of all its minimisations together.
+        Counts of the result are those of all its minimisations together. Terms that join late are left
+        out first, and stay out unless they have something to say: the minimum without them is the answer
+        if the way there is free and they are zero around it. If not, the minimisation with them starts on
+        the way there: from `guess` on if that can be reached, else from x on. Cloth meets itself late on
+        such a way, for a guess moves it with the body.
         """
         if not self._opening or not np.isfinite(guess).all():
             return self.minimise_from(guess)  # which reports a divergence
-        return self._open(self._opening, x, guess)
-
-    def minimise_from(self, x: np.ndarray) -> Result:
-        """Minimise from x (V, 3) [m], to which no collision bars the way."""
-        return self._minimiser.minimise(x)
-
-    def _open(self, opening: Minimiser, x: np.ndarray, guess: np.ndarray) -> Result:
-        """Minimise without the terms that join late, and with them only where they have something to say.
-
-        The minimum without them is the answer if the way there is free and they are zero around it. If
-        not, the minimisation with them starts on the way there: from `guess` on if that can be reached,
-        else from x on. Cloth meets itself late on such a way, for a guess moves it with the body.
-        """
-        potential, opened = self.potential, opening.minimise(guess)
+        potential, opened = self.potential, self._opening.minimise(guess)
         y = opened.positions if np.isfinite(opened.positions).all() else guess
         free = potential.ccd_fraction(x, y) == 1
         terms = potential.terms(y)
@@ -148,6 +138,10 @@ class StepMinimiser:
         if not free and potential.ccd_fraction(x, guess) == 1:
             x = guess
         return _merge(opened, self._approach(x, y))
+
+    def minimise_from(self, x: np.ndarray) -> Result:
+        """Minimise from x (V, 3) [m], to which no collision bars the way."""
+        return self._minimiser.minimise(x)
 
     def _approach(self, x: np.ndarray, guess: np.ndarray) -> Result:
         """Minimise from `guess`, or from as near to it as terms that nothing may pass through let x come.

@@ -20,6 +20,7 @@ from dataclasses import replace
 import numpy as np
 
 from reference_sim.cloth import Cloth
+from reference_sim.energies.energy import demand_positive
 from reference_sim.geometry.topology import corner_heights
 from reference_sim.minimise.descent import (
     TOLERANCE,
@@ -28,7 +29,6 @@ from reference_sim.minimise.descent import (
     Result,
     Stop,
     approximate_wolfe,
-    check_tolerance,
     dot,
     iterate,
     sufficient_decrease,
@@ -41,7 +41,8 @@ MAX_SHIFT = 1e12  # beyond it a step is shorter than round-off
 STEP_TOLERANCE = 1e-3  # of a mean edge length
 WATCHDOG_AFTER = 20  # iterations: most steps of a garment are done by then, and sooner so
 WATCHDOG_STEPS = 40  # full steps in a row before the energy has to be below its start
-PREDICTED = 0.9  # share of the predicted decrease from which on the quadratic model needs no help
+# Share of the predicted decrease from which on the quadratic model needs no help.
+PREDICTED = 0.9
 RESIDUAL_ROUND_OFF = 1e-2  # relative residual that round-off may excuse at most
 COLLAPSED = 1e-6  # [m] height of a triangle that is taken for a line
 REUSE_MEMORY = 20  # steps that correct a factorisation used again
@@ -72,7 +73,7 @@ class Newton:
         reuse: bool = False,
         start_projected: bool = False,
     ) -> None:
-        check_tolerance(tolerance)
+        demand_positive("Newton", tolerance=tolerance)
         self.potential, self.reuse = potential, reuse
         self.tolerance, self.max_iterations, self.timeout = tolerance, max_iterations, timeout
         self.hessian = FactorisedHessian(potential, tolerance=tolerance)

@@ -16,7 +16,7 @@ import pandas as pd
 
 from benchmarks.results.run_folder import RunFolder
 from reference_sim.files.atomic_files import replacing
-from reports.blocks import BLOCKS, Heading, Report, TableBlock
+from reports.blocks import BLOCKS, Report, TableBlock
 from reports.figures.plotting import style
 from reports.finished_run import Run
 from reports.page.embedded_roll_outs import BUDGET, Embedded, deflate, embed
@@ -70,8 +70,8 @@ def tables_of(report: Report) -> list[dict[str, Any]]:
     group = "Answer"
     groups: dict[str, str] = {}
     for block in BLOCKS:
-        if isinstance(block, Heading):
-            group = block.title
+        if isinstance(block, str):
+            group = block
         elif isinstance(block, TableBlock) and block.name in report.tables:
             groups[block.name] = group
     groups |= {name: "Other metrics" for name in report.tables if name not in groups}

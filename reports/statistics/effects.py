@@ -113,8 +113,8 @@ class Effect:
         tie = TIE * self.unit if self.scale == DIFFERENCE else math.log1p(TIE)
         return max(tie, self.uncertainty)
 
-    def p_value(self, factor: float = 1.0) -> float | None:
-        """Return the two-sided p-value that `factor` times the first is the second.
+    def p_value(self) -> float | None:
+        """Return the two-sided p-value that the first is the second.
 
         It is below LEVEL where the interval excludes it; None where nothing was repeated, and of costs.
         """
@@ -122,32 +122,25 @@ class Effect:
 
         if self.error is None:
             return None
-        distance = abs(self.gap(factor))
+        distance = abs(self.value)
         if self.error == 0.0:  # every motion has the same factor between the two
             return 1.0 if distance == 0.0 else self.least_p
         return max(self.least_p, float(2.0 * stats.t.sf(distance / self.error, self.freedom)))
 
-    def gap(self, factor: float = 1.0) -> float:
-        """Return how far `factor` times the first is above the second, on the scale."""
-        return self.value + self.shift(factor)
-
-    def shift(self, factor: float) -> float:
-        """Return by how much `factor` times the first moves it on the scale."""
-        return math.log(factor) if self.scale == RATIO else 0.0
-
-    def is_equal(self, factor: float = 1.0) -> bool:
+    def is_equal(self) -> bool:
         """Return whether all of the interval lies within the margin; a value without one never does.
 
         It has to with each simulation of smaller time steps in the reference's place.
         """
         moved = (0.0, *self.against.values())
-        ends = [end + self.shift(factor) for end in self.ends or ()]
+        ends = self.ends or ()
         return bool(ends) and all(abs(end + change) <= self.margin for end in ends for change in moved)
 
-    def find_reversals(self, factor: float = 1.0) -> list[str]:
+    def find_reversals(self) -> list[str]:
         """Return the simulations with smaller time steps against which the effect has the other sign."""
-        gap = self.gap(factor)
-        return [name for name, change in self.against.items() if (gap + change) * gap <= 0.0]
+        return [
+            name for name, change in self.against.items() if (self.value + change) * self.value <= 0.0
+        ]
 
     def _unscale(self, value: float) -> float:
         if self.scale == EXCESS:  # points between typical shares of the two

@@ -227,7 +227,7 @@ def judge_claims(run: Run) -> list[Judged]:
     claims = [claim for claim in CLAIMS if {claim.lower, claim.higher} <= methods]
     compared = [_compare(run, frame, claim) for claim in claims]
     p_values = [
-        comparison.effect.p_value(claim.factor) if comparison.effect else None
+        comparison.effect.p_value() if comparison.effect else None
         for claim, comparison in zip(claims, compared)
     ]
     tested = [claim for claim in PRIMARY if claim.tested]
@@ -238,7 +238,7 @@ def judge_claims(run: Run) -> list[Judged]:
     for claim, comparison, p in zip(claims, compared, p_values):
         if comparison.effect is not None and comparison.one is not None and comparison.other is not None:
             outcome = verdict(claim, comparison.effect, p)
-            remark = explain(comparison.effect, claim.factor) if outcome == OPEN else ""
+            remark = explain(comparison.effect) if outcome == OPEN else ""
             remark += comparison.one.fewer or comparison.other.fewer
         else:
             outcome, remark = verdict_of_failed(claim, comparison, frame)

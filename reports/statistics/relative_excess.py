@@ -20,14 +20,7 @@ import pandas as pd
 
 from benchmarks.metric import Metric
 from reports.finished_run import Run
-from reports.statistics.effects import (
-    EXCESS,
-    Effect,
-    effect,
-    is_recorded,
-    rescale,
-    unscale,
-)
+from reports.statistics.effects import EXCESS, Effect, effect, is_recorded, rescale, unscale
 from reports.statistics.means_and_spreads import Mean, mean_by_recording, pair
 
 TOTAL = "energy/total"

@@ -14,6 +14,7 @@ A time without a range, read from the clock once, is inconclusive.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -77,8 +78,8 @@ def decide(effect: Effect, p: float | None, factor: float = 1.0) -> str:
 
     Args:
         effect: the effect.
-        p: of effect.p_value(factor), corrected where the comparison is one of a family; None for costs.
-        factor: see `Effect.p_value`.
+        p: of effect.p_value(), corrected where the comparison is one of a family; None for costs.
+        factor: of a cost, whose scale is RATIO unless it is 1.
 
     >>> decide(Effect(0.5, "ratio", error=0.1, freedom=10.0, motions=20), p=0.001)
     'more'
@@ -89,12 +90,11 @@ def decide(effect: Effect, p: float | None, factor: float = 1.0) -> str:
         return OPEN
     if effect.covers == RANGE:
         return _decide_range(effect, factor)
-    if effect.is_equal(factor):
+    if effect.is_equal():
         return TIED
-    gap = effect.gap(factor)
-    if p is None or p >= LEVEL or abs(gap) <= effect.uncertainty or effect.find_reversals(factor):
+    if p is None or p >= LEVEL or abs(effect.value) <= effect.uncertainty or effect.find_reversals():
         return OPEN
-    return LESS if gap < 0.0 else MORE
+    return LESS if effect.value < 0.0 else MORE
 
 
 def explain_untested(effect: Effect) -> str:
@@ -110,19 +110,19 @@ def explain_untested(effect: Effect) -> str:
     return f": fewer than {LEAST_MOTIONS} motions" if effect.motions < LEAST_MOTIONS else ""
 
 
-def explain(effect: Effect, factor: float = 1.0) -> str:
+def explain(effect: Effect) -> str:
     """Return why an effect is inconclusive, as a remark behind it: untested, or turned by smaller steps.
 
     >>> explain(Effect(0.5, "ratio", error=0.1, motions=20, against={"simulation-dt/8": -0.6}))
     ': other sign against simulation-dt/8'
     """
-    p, turned = effect.p_value(factor), ", ".join(effect.find_reversals(factor))
-    clear = p is not None and p < LEVEL and abs(effect.gap(factor)) > effect.uncertainty
+    p, turned = effect.p_value(), ", ".join(effect.find_reversals())
+    clear = p is not None and p < LEVEL and abs(effect.value) > effect.uncertainty
     return explain_untested(effect) or (f": other sign against {turned}" if turned and clear else "")
 
 
 def _decide_range(effect: Effect, factor: float) -> str:
-    ends = [end + effect.shift(factor) for end in effect.limits or (effect.value,)]
+    ends = [end + math.log(factor) for end in effect.limits or (effect.value,)]
     if all(abs(end) <= effect.margin for end in ends):
         return TIED
     if max(ends) < 0.0:

@@ -234,7 +234,8 @@ REMARKS = {
 }
 SPREAD = "±: standard deviation over seeds or, if larger, noise of the reference or a sample's error."
 _COVERED = {"seeds": "‡", "motions": "§", RANGE: "#"}
-SMALL = 1e-3  # what is asked for in more digits and lies below it is an error: two digits say enough
+# What is asked for in more digits and lies below it is an error: two digits say enough.
+SMALL = 1e-3
 
 
 def remarks_below(table: Table, lines: Sequence[Sequence[CellText]]) -> str:

@@ -46,11 +46,8 @@ def write_paper_table(folder: RunFolder, run: Run) -> Table:
 
 def _name_lacking(table: Table, row: tuple[Cell, ...]) -> str:
     """Return the columns in which a row's mean is over fewer scenes or seeds than it should be."""
-    names = []
-    for column, cell in zip(table.columns, row):
-        if isinstance(cell, Effect) and not cell.complete:
-            names.append(column.name)
-    return ", ".join(names)
+    cells = zip(table.columns, row)
+    return ", ".join(c.name for c, cell in cells if isinstance(cell, Effect) and not cell.complete)
 
 
 def paper_table(run: Run) -> Table:

@@ -18,7 +18,8 @@ from reference_sim.files.array_file import read_arrays
 from snug.body.skeleton import BodyError, joint_transforms, rotation_matrices
 
 BODY_FILE = Path(__file__).resolve().parent.parent / "data" / "body.npz"
-SHAPES = 10  # shape coefficients kept when a file has more, and read by networks of pose and shape
+# Shape coefficients kept when a file has more, and read by networks of pose and shape.
+SHAPES = 10
 _CHUNK = 64  # frames skinned in one matrix product, to bound memory
 
 

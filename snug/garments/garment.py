@@ -8,11 +8,10 @@ from dataclasses import dataclass, field
 import igl
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.sparse import coo_array
 
 from reference_sim.cloth import Cloth
 from reference_sim.geometry.closest_point import FaceSearch
-from reference_sim.geometry.topology import Array, Index, boundary_loops, half_edges
+from reference_sim.geometry.topology import Array, Index, boundary_loops
 from reference_sim.material import Material
 from snug.body.parametric_body import Body
 from snug.body.skeleton import JOINT_NAMES
@@ -111,10 +110,8 @@ def smooth_weights(values: ArrayLike, faces: Index, iterations: int) -> Array:
     [0.5, 0.25, 0.25]
     """
     smooth = np.asarray(values, dtype=np.float64)
-    halves = half_edges(faces)
-    pairs = np.unique(np.concatenate([halves, halves[:, ::-1]]), axis=0)
-    neighbours = coo_array((np.ones(len(pairs)), tuple(pairs.T)), shape=(len(smooth),) * 2).tocsr()
-    degree = neighbours.sum(axis=1).reshape(-1, 1)
+    neighbours = igl.adjacency_matrix(faces).astype(np.float64).tocsr()
+    degree = np.asarray(neighbours.sum(axis=1))
     for _ in range(iterations):
         smooth = 0.5 * smooth + 0.5 * (neighbours @ smooth) / degree
     return smooth
@@ -122,8 +119,10 @@ def smooth_weights(values: ArrayLike, faces: Index, iterations: int) -> Array:
 
 NEVER = ("head", "left_wrist", "right_wrist", "left_hand", "right_hand", "left_foot", "right_foot")
 INSIDE = 0.5  # winding number of the garment around what it encloses
-COVERED = 0.05  # share of a limb's skin within a garment, from which the garment follows that limb
-BELOW_HIPS = 0.1  # [m] below the hip joints, from where one tube around both legs follows neither
+# Share of a limb's skin within a garment, from which the garment follows that limb.
+COVERED = 0.05
+# Depth below the hip joints from where one tube around both legs follows neither.
+BELOW_HIPS = 0.1  # [m]
 
 
 def find_weights(body: Body, positions: Array, faces: Index) -> tuple[Array, Index]:

@@ -8,6 +8,7 @@ a search (snug.training.contact_cache).
 
 from __future__ import annotations
 
+import igl
 import numpy as np
 
 from reference_sim.geometry.leaf_bounds import closest_on_triangle
@@ -21,14 +22,8 @@ CROSSINGS = 12  # sides that an anchor may cross at a time: some 15 cm
 
 def triangle_adjacency(faces: np.ndarray) -> np.ndarray:
     """Return (Q, 3) int32 for faces (Q, 3): the face across the side opposite to each corner, or -1."""
-    sides = np.sort(faces[:, [[1, 2], [2, 0], [0, 1]]], axis=2).reshape(-1, 2)
-    _, number = np.unique(sides, axis=0, return_inverse=True)
-    order = np.argsort(number.ravel(), kind="stable")
-    adjacency = np.full(len(sides), -1, np.int32)
-    twins = np.flatnonzero(np.diff(number.ravel()[order]) == 0)
-    first, second = order[twins], order[twins + 1]
-    adjacency[first], adjacency[second] = second // 3, first // 3
-    return adjacency.reshape(-1, 3)
+    across, _ = igl.triangle_triangle_adjacency(faces)  # of the sides from each corner to the next
+    return np.ascontiguousarray(across[:, [1, 2, 0]], np.int32)
 
 
 @njit(cache=True, inline="always", error_model="numpy")  # a call costs as much as a walk

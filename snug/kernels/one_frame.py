@@ -13,7 +13,8 @@ from reference_sim.kernels.kernel_cache import njit
 # Kinds of operations: y = W x + b, y += that, its positive part, and that times its sigmoid (SiLU); a
 # cell; offsets of a block of vertices by one handle, and those added; y += x.
 PRODUCT, ADDED, RECTIFIED, SMOOTH, CELL, HANDLE, HANDLE_ADDED, SUM = range(8)
-ROWS, COLUMNS = 4, 32  # a matrix has multiples of these: rows at once, and numbers in vector registers
+# A matrix has multiples of these: rows at once, and numbers in vector registers.
+ROWS, COLUMNS = 4, 32
 VERTEX_BLOCK = 64  # vertices that are skinned together
 FAST = {"reassoc", "contract", "nsz"}  # a number that is not finite stays so
 _ZERO, _ONE, _TWO, _HALF = (np.float32(x) for x in (0.0, 1.0, 2.0, 0.5))

@@ -32,7 +32,8 @@ SPINE_SHARES = (("spine1", 0.3), ("spine2", 0.3), ("spine3", 0.4))
 # Foot to shank, passive range; beyond it the heel comes off the floor instead.
 ANKLE_RANGE = (-55.0, 30.0)
 RATE = 120.0  # [1/s] at which motions are built
-SMOOTHING = 0.03  # [s] muscles do not start at once: standard deviation of the Gaussian over all angles
+# Muscles do not start at once: standard deviation of the Gaussian over all angles.
+SMOOTHING = 0.03  # [s]
 FREE_FALL = 9.81  # [m/s^2]
 CONTACT_DEPTH = 0.01  # [m] a sole point this much higher than the lowest carries 1/e of its weight
 

@@ -122,7 +122,8 @@ def check_recording(motion: Motion) -> None:
 
 
 MAX_BONE_CHANGE = 0.05  # share of a bone's length by which tracked joints may vary
-MAX_BONE_RATIO = 2.0  # between most bones' lengths, each relative to ours: a child's are near an adult's
+# Ratio between most bones' lengths, each relative to ours: a child's are near an adult's.
+MAX_BONE_RATIO = 2.0
 
 
 def are_positions(triples: np.ndarray) -> bool:

@@ -75,7 +75,8 @@ def _columns(matrices: np.ndarray) -> np.ndarray:
 
 STATIC_WIDTHS = (64, 128, 256, 512)
 JOINT_WIDTHS = (32, 32)  # of layers that all joints share
-WIDTH = 512  # of the codes, of the other layers of the dynamic branch, and of the decoder
+# Width of the codes, of the other layers of the dynamic branch, and of the decoder.
+WIDTH = 512
 DECODER_LAYERS = 3
 # frames: with a window of three the recurrent units see 16, half a second of rates at 30 a second
 LEAD = 13

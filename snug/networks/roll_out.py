@@ -29,10 +29,6 @@ SKINNING = {"method": "skinning"}  # provenance without a network
 QUASI_STATIC_FRAMES = 30  # frames for which a pose is held before its output counts as static
 
 
-class RollOutError(ValueError):
-    """A model that does not fit the garment or the motion; the message says in what."""
-
-
 def roll_out(
     model: TrainedModel,
     dressed: DressedBody,
@@ -57,7 +53,7 @@ def roll_out(
         World positions (T, V, 3) [m], float64; status `diverged` if one is not finite.
 
     Raises:
-        RollOutError: if the model does not fit the garment or the motion.
+        ValueError: if the model does not fit the garment or the motion.
 
     >>> roll_out(TrainedModel.load("snug.safetensors"), dressed, motion).status  # doctest: +SKIP
     'ok'
@@ -111,7 +107,7 @@ def prepare_batch(
     """Return a function that computes `copies` bodies in that motion at once, (T, copies, V, 3) [m], float32.
 
     Positions are relative to the pelvis. Frame follows frame, as the state is carried. Raises
-    RollOutError.
+    ValueError.
     """
     features = _features(model, dressed, motion, None)[:, None, None].expand(-1, copies, -1, -1)
     rest, weights = dressed.rest(), dressed.weights(model.recipe.smoothing)
@@ -159,15 +155,11 @@ class CompiledFrame:
         unposed = np.zeros((3, VERTEX_BLOCK * (len(joints[0]) - 1)), np.float32)
         unposed[:, : len(order)] = rest.numpy()[order].T
         self._skinning = unposed, *joints, order
-        self._operations, self._size = None, unposed.size
+        self._operations, self.size = None, unposed.size
         if network is not None:
             plan = FramePlan(order, unposed.shape[1], pins=network.pins, scale=network.output_scale)
             network.lay_out(plan, plan.add_normalised(network.input_mean, network.input_std))
-            self._operations, self._size = plan.operations(), plan.size
-
-    def start(self) -> np.ndarray:
-        """Return a fresh working array, whose state is zero."""
-        return np.zeros(self._size, np.float32)
+            self._operations, self.size = plan.operations(), plan.size
 
     def __call__(
         self,
@@ -179,7 +171,7 @@ class CompiledFrame:
     ) -> None:
         """Write the world vertices into `out` (V, 3) [m] float64, and the state after this frame into `work`.
 
-        work: array of `start`, or as the frame before left it; features (D,) float32, unused without a
+        work: `size` zeros, or as the frame before left it; features (D,) float32, unused without a
         network; transforms of the joints (J, 3, 4) float32; pelvis (3,) [m] float64.
         """
         if self._operations is None:  # without a network no more than skinning is compiled
@@ -200,7 +192,7 @@ def prepare_frames(
 
     Inputs and joint transforms are made, and the network warmed up, before this returns. The inputs know
     the motion `earlier`, and the roll-out starts from the state that it leaves. Without a model it is
-    skinning alone, by the weights of the default recipe. Raises RollOutError if the model does not fit.
+    skinning alone, by the weights of the default recipe. Raises ValueError if the model does not fit.
     """
     features, network, recipe = np.empty((motion.frames, 0), np.float32), None, DEFAULT
     if model is not None:
@@ -210,7 +202,7 @@ def prepare_frames(
     frame = CompiledFrame(dressed.rest(betas), dressed.weights(recipe.smoothing), network)
     transforms, pelvis = dressed.transforms(motion.poses, betas).numpy(), dressed.pelvis(motion, betas)
     past, features = features[: -motion.frames], features[-motion.frames :]
-    start, out = frame.start(), np.empty((dressed.vertices, 3))
+    start, out = np.zeros(frame.size, np.float32), np.empty((dressed.vertices, 3))
     for before in past:
         frame(before, transforms[0], pelvis[0], start, out)
 
@@ -237,7 +229,7 @@ def prepare_frame_inputs(
     """Return a function that makes one frame's inputs from its pose and those before, as an application does.
 
     It gives features (D,), or None without a model, joint transforms (24, 3, 4) and pelvis (3,) [m]: the
-    same numbers that `prepare_frames` makes for all frames at once. Raises RollOutError.
+    same numbers that `prepare_frames` makes for all frames at once. Raises ValueError.
     """
     whole = earlier.followed_by(motion) if earlier else motion
     first = whole.frames - motion.frames
@@ -264,18 +256,18 @@ def _features(
 ) -> Tensor:
     """Return the network's inputs (T, D).
 
-    Raises RollOutError for another garment's model, or one that has learned motions of another rate.
+    Raises ValueError for another garment's model, or one that has learned motions of another rate.
     """
     if model.vertices != dressed.vertices:
-        raise RollOutError(f"the model has {model.vertices} vertices, the garment {dressed.vertices}")
+        raise ValueError(f"the model has {model.vertices} vertices, the garment {dressed.vertices}")
     if model.triangles and model.triangles != digest_triangles(dressed.garment.faces):
-        raise RollOutError(
+        raise ValueError(
             "the model is of a garment with as many vertices and other triangles: tailor the garment that it "
             "was trained for, or train one for this"
         )
     timeless = not (model.network.sequential or FEATURE_SETS[model.network.feature_set])
     if model.fps and not timeless and abs(model.fps - motion.fps) > RATE_TOLERANCE * model.fps:
-        raise RollOutError(
+        raise ValueError(
             f"the model has learned from {model.fps:g} frames a second, motion {motion.name} has "
             f"{motion.fps:g}: resample it (snug.motion.motion.resample)"
         )
@@ -284,7 +276,7 @@ def _features(
     )
     inputs = model.network.input_mean.shape[0]
     if features.shape[1] != inputs:
-        raise RollOutError(
+        raise ValueError(
             f"the model reads {inputs} numbers a frame, this body and motion give {features.shape[1]}"
         )
     return features

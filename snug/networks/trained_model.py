@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -18,10 +18,6 @@ MODEL_FORMAT = "snug-model-10"
 _COPIED = (
     "unit", "seed", "steps", "seconds", "setup_seconds", "history", "summary", "fps", "triangles", "origin",
 )  # fmt: skip
-
-
-class ModelFileError(TensorFileError):
-    """A file that is no model of this project; the message names the file and what is wrong."""
 
 
 @dataclass
@@ -70,11 +66,6 @@ class TrainedModel:
     origin: dict[str, Any] = field(default_factory=dict)
 
     @property
-    def megabytes(self) -> float:
-        """Memory of the network at run time [MB]."""
-        return self.network.megabytes
-
-    @property
     def vertices(self) -> int:
         """Number of vertices of the garment."""
         return int(self.network.vertices)
@@ -84,7 +75,7 @@ class TrainedModel:
         metadata = {
             "format": MODEL_FORMAT,
             "kind": self.kind,
-            "recipe": self.recipe.as_dict(),
+            "recipe": asdict(self.recipe),
             "inputs": self.network.input_mean.shape[0],
             "vertices": self.vertices,
             "pins": [int(pin) for pin in self.network.pins],
@@ -100,23 +91,20 @@ class TrainedModel:
             path: of its file, or the name of a network of the package (snug.trained), as `snug-tshirt`.
 
         Raises:
-            ModelFileError: for an unknown name, and a missing, broken or foreign file, or another format.
+            TensorFileError: for an unknown name, and a missing, broken or foreign file, or another format.
 
         >>> TrainedModel.load("tshirt-snug")
         Traceback (most recent call last):
         ...
-        snug.networks.trained_model.ModelFileError: tshirt-snug: neither a model file nor a network of the \
+        snug.networks.tensor_file.TensorFileError: tshirt-snug: neither a model file nor a network of the \
 package: pbns-tshirt, ...
         """
         path = _find_file(path)
-        try:
-            tensors, data = read_tensors(path)
-        except TensorFileError as error:
-            raise ModelFileError(str(error)) from error
+        tensors, data = read_tensors(path)
         try:
             if data["format"] != MODEL_FORMAT:
                 remedy = f"this version reads {MODEL_FORMAT!r}: train again"
-                raise ModelFileError(f"{path}: format {str(data['format'])[:40]!r}, {remedy}")
+                raise TensorFileError(f"{path}: format {str(data['format'])[:40]!r}, {remedy}")
             recipe = Recipe.from_dict(data["recipe"])
             network = make_network(
                 data["kind"],
@@ -127,15 +115,15 @@ package: pbns-tshirt, ...
                 pins=data["pins"],
             )
             if network.state_dict().keys() != tensors.keys():
-                raise ModelFileError(
+                raise TensorFileError(
                     f"{path}: not the weights of this version's {data['kind']}: train again"
                 )
             network.load_state_dict(tensors)
             copied = {name: data[name] for name in _COPIED}
-        except ModelFileError:
+        except TensorFileError:
             raise
         except (LookupError, ValueError, RuntimeError, TypeError, AttributeError) as error:
-            raise ModelFileError(
+            raise TensorFileError(
                 f"{path}: broken model file ({' '.join(str(error).split())[:200]})"
             ) from error
         return cls(data["kind"], network.eval(), recipe, **copied)
@@ -151,11 +139,11 @@ def digest_triangles(faces: np.ndarray) -> str:
 
 
 def _find_file(path: str | Path) -> Path:
-    """Return the file of a model, by its path or by its name in the package. Raises ModelFileError."""
+    """Return the file of a model, by its path or by its name in the package. Raises TensorFileError."""
     networks = list_networks()
     if isinstance(path, str) and path in networks:
         return networks[path]
     if isinstance(path, str) and not Path(path).suffix and not Path(path).exists():
         names = ", ".join(networks)
-        raise ModelFileError(f"{path}: neither a model file nor a network of the package: {names}")
+        raise TensorFileError(f"{path}: neither a model file nor a network of the package: {names}")
     return Path(path)

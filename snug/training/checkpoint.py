@@ -85,7 +85,7 @@ def describe_run(trainer: Trainer, **facts: Any) -> dict[str, Any]:
         digest.update(array.tobytes())
     return {
         "kind": trainer.kind,
-        "recipe": trainer.recipe.as_dict() | {"terms": list(trainer.recipe.terms)},
+        "recipe": asdict(trainer.recipe) | {"terms": list(trainer.recipe.terms)},
         "seed": trainer.seed,
         "steps": trainer.steps,
         # These change the order of sums, and so the last bits.

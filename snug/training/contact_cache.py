@@ -22,7 +22,8 @@ from reference_sim.kernels.fast_kernels import TRAINING_LANES
 from reference_sim.obstacle import DEFAULT_REGION, reachable_faces
 from snug.kernels.contact import PARTS, WALK_SLACK, byte_normals, contact_energy, triangle_adjacency
 
-EXACT = 0.015  # m: a sample farther from the skin than this is in no contact, and its anchor may be rough
+# A sample farther from the skin than this is in no contact, and its anchor may be rough.
+EXACT = 0.015  # m
 
 
 class Patch:

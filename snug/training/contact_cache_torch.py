@@ -70,9 +70,9 @@ class TensorContactCache:
     ) -> Anchors:  # fmt: skip
         """Return the anchors of frames (N,), moved as snug.kernels.contact.walk_to_foot does.
 
-        Those of samples (N, S, 3) less than `reach` and SLACK above their planes walk. A frame that comes
-        twice walks once, as its first garment has it. first (N,): see `first_places`; positions, normals:
-        bodies (N, P, 3).
+        Those of samples (N, S, 3) less than `reach` and WALK_SLACK above their planes walk. A frame that
+        comes twice walks once, as its first garment has it. first (N,): see `first_places`; positions,
+        normals: bodies (N, P, 3).
         """
         faces, barycentric = self._walk(samples, *self.anchors(frames), positions, normals, reach)
         return faces[first], barycentric[first]

@@ -16,25 +16,21 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-class DeviceError(ValueError):
-    """A device that this machine does not have; the message says what to use instead."""
-
-
 def find_device(name: str) -> torch.device:
     """Return the device `cpu`, `cuda` or `cuda:1`; on a GPU, recurrent units no longer use TF32.
 
-    Raises DeviceError for an unknown or absent one.
+    Raises ValueError for an unknown or absent one.
     """
     try:
         device = torch.device(name)
     except RuntimeError:
         device = None
     if device is None or device.type not in ("cpu", "cuda"):
-        raise DeviceError(f"--device {name}: use cpu or cuda")
+        raise ValueError(f"--device {name}: use cpu or cuda")
     if device.type == "cpu":
         return device
     if (device.index or 0) >= torch.cuda.device_count():
-        raise DeviceError(
+        raise ValueError(
             f"--device {name}: this machine has {torch.cuda.device_count()} of them; use cpu"
         )
     torch.backends.cudnn.allow_tf32 = False  # it rounds what is multiplied to ten bits

@@ -18,7 +18,7 @@ from snug.kernels.skinning import FastSkin
 from snug.kinds import find_kind
 from snug.motion.motion import Motion
 from snug.networks.dressed_body import DressedBody
-from snug.networks.garment_network import GarmentNetwork, make_network
+from snug.networks.garment_network import make_network
 from snug.networks.tensor_file import select_tensors
 from snug.recipe import Recipe
 from snug.training.augmentation import make_training_set, varies_shape
@@ -26,22 +26,15 @@ from snug.training.contact_planes import NearestVertices, Posed, TrainingContact
 from snug.training.device import CPU, compile_for
 from snug.training.divergence_guard import SETTLING, DivergenceGuard, live_tensors
 from snug.training.physics_loss import PhysicsLoss
-from snug.training.simulated_data import TARGETS, Trajectories, VertexTargets
-from snug.training.training_set import HiddenStateCache, TrainingError, TrainingSet
+from snug.training.simulated_data import TARGETS, BandTargets, Trajectories, VertexTargets
+from snug.training.training_set import HiddenStateCache, TrainingError
 
-DROP, COSINE_END = 0.1, 0.01  # factors on the rate after the drop of `epochs`, and at the end of `cosine`
+# Factors on the rate after the drop of `epochs`, and at the end of `cosine`.
+DROP, COSINE_END = 0.1, 0.01
 DROP_AFTER = 10  # epochs
 GRADIENT_LIMIT = 1.0  # norm to which the gradient of a step with a high window is clipped
-MOSTLY_FINE = 0.25  # largest share of high windows in a batch whose prediction is still worth a search
-
-
-def start_network(kind: str, data: TrainingSet, *, seed: int) -> GarmentNetwork:
-    """Return the network of a training set before its first step, its inputs' statistics set."""
-    garment, inputs = data.dressed.garment, data.features.shape[1]
-    network = make_network(kind, inputs, data.dressed.vertices, data.recipe, seed=seed, pins=garment.pins)
-    network.wear(garment)
-    network.normalise_by(*data.input_statistics())
-    return network
+# Largest share of high windows in a batch whose prediction is still worth a search.
+MOSTLY_FINE = 0.25
 
 
 class Trainer:
@@ -79,9 +72,12 @@ class Trainer:
         self.data = make_training_set(spec, dressed, motions, recipe, seed=seed, device=device)
         self.shaped = varies_shape(spec, dressed, recipe) and recipe.shape_of == "window"
         self.dressed, self.weights = dressed, dressed.weights(recipe.smoothing).to(device)
-        self.network = start_network(kind, self.data, seed=seed).to(device)
-        if spec.closed_form:
-            self.network.closed_form = self.kernels
+        inputs, garment = self.data.features.shape[1], dressed.garment
+        network = make_network(kind, inputs, dressed.vertices, recipe, seed=seed, pins=garment.pins)
+        network.wear(garment)
+        network.normalise_by(*self.data.input_statistics())
+        self.network = network.to(device)
+        self.network.closed_form = self.kernels
         on_gpu = device.type == "cuda"
         self.optimiser = torch.optim.AdamW(
             self.network.parameters(),
@@ -166,14 +162,14 @@ class Trainer:
     ) -> dict[str, float]:
         """Descend once by the loss of windows (N,) on bodies of betas (N, S); return its mean terms."""
         batch = self.data.batch(windows, betas)
-        if self.loss is None:
-            assert self.targets is not None
-            terms = self.targets.terms(self.network, batch, state, self.posed_by)
-            return self._update(number, windows, terms)[0]
+        if isinstance(self.targets, BandTargets):
+            return self._update(number, windows, self.targets.terms(self.network, batch, state))[0]
         offsets, end = self.network(batch.features, state)
         # Offsets first: the sum then lies in memory as they do.
         x = self.posed_by(offsets + batch.rest, self.weights, batch.transforms)
         distances = self.targets.distances(x, batch) if self.targets else {}
+        if self.loss is None:
+            return self._update(number, windows, distances)[0]
         planes = posed = None
         if self.contact:
             posed = self.contact.bodies.pose(batch)

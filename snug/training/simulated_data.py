@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, cast
@@ -159,18 +159,6 @@ class VertexTargets:
         self.weights = weights
         self.vertices = relative_vertices(data.dressed, motions, trajectories).to(data.device)
 
-    def terms(
-        self,
-        network: GarmentNetwork,
-        batch: Batch,
-        state: Tensor | None,
-        posed_by: Callable[..., Tensor],
-    ) -> dict[str, Tensor]:
-        """Return parts of the loss of each window and frame, name -> (N, T). posed_by: skin, or its equal."""
-        offsets, _ = network(batch.features, state)
-        x = posed_by(offsets + batch.rest, self.weights, batch.transforms)
-        return self.distances(x, batch)
-
     def distances(self, x: Tensor, batch: Batch) -> dict[str, Tensor]:
         """Return the mean squared distance of vertices x (N, T, V, 3) [m], name -> (N, T) [cm^2]."""
         missed = x - self.vertices[torch.as_tensor(batch.frames)]
@@ -188,13 +176,7 @@ class BandTargets(VertexTargets):
         self.low = torch.as_tensor(low, dtype=torch.float32).to(data.device)
         self.high = offsets.to(data.device) - self.low
 
-    def terms(
-        self,
-        network: GarmentNetwork,
-        batch: Batch,
-        state: Tensor | None,
-        posed_by: Callable[..., Tensor],
-    ) -> dict[str, Tensor]:
+    def terms(self, network: GarmentNetwork, batch: Batch, state: Tensor | None) -> dict[str, Tensor]:
         """Return the loss of both bands of the unposed offsets, name -> (N, T)."""
         rows = torch.as_tensor(batch.frames)
         low, high = cast(FrequencyMixture, network).bands(batch.features, state)

@@ -158,8 +158,7 @@ def train_network(
         checkpoint: where checkpoints are written; the caller deletes it after storing the model.
 
     Raises:
-        ValueError: TrainingError, RecipeError, DeviceError or TensorFileError, naming what is
-            missing or diverged.
+        ValueError: TrainingError or TensorFileError among them, naming what is missing or diverged.
 
     >>> model = train_network("snug", dressed, motions, steps=2000, seed=0)  # doctest: +SKIP
     """

@@ -84,6 +84,7 @@ def test_pins_ride_on_an_obstacle_that_moves_below_them_and_stay_elsewhere(simul
         ("sheet.obj --obstacle-rest sheet.obj -o a.vtkhdf", "is a pose of an obstacle: add --obstacle"),
         ("sheet.obj --pins top -o a.vtkhdf", "--pins top: the mesh is level, all of it is its top"),
         ("sheet.obj --weld 0.5 -o a.vtkhdf", "makes a line of triangle 0: weld by less"),
+        ("sheet.obj --weld 0 -o a.vtkhdf", "weld=0.0: give a distance above 0"),
         ("sheet.obj --weld nan -o a.vtkhdf", "weld=nan: give a distance above 0"),
     ],
 )  # fmt: skip

@@ -128,7 +128,7 @@ def test_a_step_that_round_off_excuses_says_so_in_its_frame():
         ({"start": SHEET[:-1]}, "start is (48, 3): finite numbers (49, 3) are due"),
         ({"pin_positions": lambda _: np.zeros(3)}, "pin_positions(1) is (3,): finite numbers (0, 3)"),
         ({"dt": 0.0}, "dt = 0.0: must be a finite number above 0"),
-        ({"tolerance": np.nan}, "tolerance = nan: give a finite number above 0"),
+        ({"tolerance": np.nan}, "tolerance = nan: must be a finite number above 0"),
         ({"method": "bfgs"}, "unknown minimiser 'bfgs': choose one of newton, lbfgs"),
     ],
 )

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.method import MethodEntry, Reporting
+from benchmarks.method import MethodEntry
 from benchmarks.methods import METHODS
 from benchmarks.metrics import find_metric
 from benchmarks.results.row import Row
@@ -29,13 +29,13 @@ DECLARED = {entry.name: entry for entry in METHODS}  # any other is a network of
 def row(scene="tshirt/walk", method="snug", metric="energy/strain", value=1.0, *, seed=0, **more) -> Row:
     """A row with the columns that its scene and method declare."""
     own = MethodEntry(name=method, description="", role="network", seeded=True,
-                      reporting=Reporting(pairing_group=method))  # fmt: skip
+                      pairing_group=method)  # fmt: skip
     entry = DECLARED.get(method, own)
     garment, _, motion = scene.partition("/")
     declared = {
-        "role": entry.role, "family": entry.reporting.family or method, "base": entry.reporting.base,
-        "level": entry.reporting.level, "seeded": entry.seeded and not metric.startswith("cost/"),
-        "pairing_group": entry.reporting.pairing_group,
+        "role": entry.role, "family": entry.family or method, "base": entry.base,
+        "level": entry.level, "seeded": entry.seeded and not metric.startswith("cost/"),
+        "pairing_group": entry.pairing_group,
         "garment": garment if motion else "", "motion": motion, "part": "whole" if motion else "",
     }  # fmt: skip
     more = {"suite": "garments", "unit": "J", "hardware": "here", **declared, **more}

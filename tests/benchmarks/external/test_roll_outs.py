@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pickle
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -171,7 +172,8 @@ def test_another_mesh_of_the_same_surface_is_compared_as_a_surface_alone(tmp_pat
     trajectory = method.run()
     assert method.quasi_static() is None
     for other_mesh, status in ((True, "ok"), (False, "failed")):
-        assert judge(trajectory, Reading(0.0), SCENE, truncated=False, other_mesh=other_mesh)[0] == status
+        declared = replace(entry, other_mesh=other_mesh)
+        assert judge(trajectory, Reading(0.0), SCENE, declared)[0] == status
     group = grouped(SCENE, {"simulation": X})
     metrics = measure_roll_out(RollOut(group, entry, trajectory, suites=("speed",)))[0]
     assert set(metrics) == {"surface/chamfer", "surface/normals"} and metrics["surface/chamfer"] < 1e-9

@@ -47,13 +47,13 @@ TINY = dataclasses.replace(
 
 
 def effort(entry) -> float:
-    level = entry.reporting.level or 0.0
-    return -level if entry.reporting.family == "simulation-tolerance" else level
+    level = entry.level or 0.0
+    return -level if entry.family == "simulation-tolerance" else level
 
 
 # Further learned methods have tests of their own; of a family the one of least effort speaks for all.
 ENTRIES = [*map(find_method, ("simulation", "skinning", *KINDS)), *SOLVERS]
-LEAST = {e.reporting.family or e.name: e for e in sorted(ENTRIES, key=effort, reverse=True)}.values()
+LEAST = {e.family or e.name: e for e in sorted(ENTRIES, key=effort, reverse=True)}.values()
 CHOSEN = [entry for entry in ENTRIES if entry in LEAST]
 BODY = f"tshirt/{TEST}"
 # Each solver is run in one scene at least, these in all of them.
@@ -66,7 +66,7 @@ NAMES = [*(scene.name for scene in SCENES), BODY]
 
 
 def runs_in(entry, name: str) -> bool:
-    family = entry.reporting.family or entry.name
+    family = entry.family or entry.name
     return family in EVERYWHERE or (name == BODY and family in ON_A_BODY)
 
 

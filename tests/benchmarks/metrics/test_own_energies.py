@@ -9,12 +9,7 @@ import pytest
 
 from benchmarks.assets import make_motions, open_assets
 from benchmarks.methods import find_method
-from benchmarks.methods.own_energies import (
-    OWN_REFERENCES,
-    STATIC,
-    find_energies,
-    find_own_reference,
-)
+from benchmarks.methods.own_energies import OWN_REFERENCES, STATIC, find_energies, find_own_reference
 from benchmarks.methods.simulation import STATIC as AT_REST
 from benchmarks.methods.simulation import Simulation
 from benchmarks.metrics.own_energies import NAME, compare, measure

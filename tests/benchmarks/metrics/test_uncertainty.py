@@ -61,7 +61,7 @@ def test_a_start_is_moved_by_its_shift_and_in_no_two_runs_alike():
     scene = small_scene("hanging_sheet", cells=4)
     starts = []
     for name in ("simulation-perturbed-1e-9", "simulation-perturbed-1e-4"):
-        level = find_method(name).reporting.level
+        level = find_method(name).level
         moved = prepared(name, scene).scene.start - scene.start
         lengths = np.linalg.norm(moved, axis=1)
         assert lengths[scene.cloth.free] == pytest.approx(level, rel=1e-6)
@@ -73,7 +73,7 @@ def test_a_start_is_moved_by_its_shift_and_in_no_two_runs_alike():
 def test_numbers_of_the_reference_are_as_uncertain_as_its_starts_differ():
     def row(method, metric, value, uncertainty=None):
         entry = find_method(method)
-        more = {"role": entry.role, "family": entry.reporting.family, "level": entry.reporting.level}
+        more = {"role": entry.role, "family": entry.family, "level": entry.level}
         return Row("garments", "tshirt/x", method, 0, metric, "J", value, uncertainty=uncertainty, **more)
 
     rows = [

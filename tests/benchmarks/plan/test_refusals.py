@@ -14,6 +14,7 @@ FIELDS = [  # study.toml -> line, field, and what is near it
     ("seeds = [", "not readable as TOML"),
     ("sedes = [0]", "study.toml: line 1: sedes: no field is called 'sedes'; did you mean seeds"),
     ("seeds = [-1]", "seeds: '-1': give at least one whole number"),
+    ("seeds = [1, 1]", "seeds: (1, 1): give each once"),
     ("split = 'tset'", "split: 'tset': choose from test, validation"),
     ("sizes = 'huge'", "sizes: unknown preset 'huge'; choose from smoke, small, quick, paper"),
     ("[sizes]\nbase = 'smoke'\nframe = 3", "study.toml: line 3: sizes.frame: no field is called 'frame'"),
@@ -25,6 +26,7 @@ FIELDS = [  # study.toml -> line, field, and what is near it
 WORDS = [
     ("dfault", "no study 'dfault': name one, or a file or folder with study.toml; did you mean default"),
     ("full:shapes", "no such scene meets such a method in part shapes"),
+    ("latin.toml:garments", "latin.toml: not readable as TOML"),
     ("--set sizes.frames=2", "sizes.frames: 2: give 3 or more"),
     ("--set sizes.test_motions=-1", "sizes.test_motions: -1: give 1 or more"),
     ("--set sizes.steps.snug=0", "sizes.steps.snug: 0: give 1 or more"),
@@ -91,10 +93,11 @@ def folder(tmp_path, monkeypatch):
         "full/note.txt": "a", "torn/run.json": '{"command": ', "random.py": "METHODS = ()\n",
         "broken.npz": "PK no zip", "folder/a.txt": "", "twice.py": twice, "worn.py": worn,
         "bare.py": twice.replace("energy/total", "mine/x").replace('unit="m"', 'unit=""'),
+        "latin.toml": "question = '\xff'",
     }  # fmt: skip
     for name, text in texts.items():
         (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).write_text(text)
+        (tmp_path / name).write_text(text, "latin-1")
     for name, frames in (("back", 3), ("walk", 3), ("short", 2)):
         still = {"poses": np.zeros((frames, 72)), "trans": np.zeros((frames, 3)), "fps": 30}
         np.savez(tmp_path / f"{name}.npz", **still)

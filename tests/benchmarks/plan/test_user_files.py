@@ -21,7 +21,7 @@ from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.schedule import Schedule
 from benchmarks.scenes import find_scene
 from reference_sim.files.array_file import read_arrays
-from snug.recipe import DEFAULT, RecipeError
+from snug.recipe import DEFAULT
 from tests.benchmarks.plan.outside_files import (
     HELPER,
     METRIC_FILE,
@@ -161,7 +161,7 @@ def test_a_study_brings_known_answers_of_its_own(tmp_path):
 
 
 def test_an_energy_of_a_file_can_be_trained_on_once_it_is_loaded(tmp_path):
-    with pytest.raises(RecipeError, match=r"unknown energy 'levity'.*import the file of your own"):
+    with pytest.raises(ValueError, match=r"unknown energy 'levity'.*import the file of your own"):
         dataclasses.replace(DEFAULT, terms=("levity",))
     (tmp_path / "levity.py").write_text(SCENE_FILE + "class Levity(Lift):\n    name = 'levity'\n")
     user_files.import_file(str(tmp_path / "levity.py"))

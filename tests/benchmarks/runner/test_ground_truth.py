@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -155,6 +156,8 @@ def test_training_motions_are_simulated_and_written_once_all_are_whole(tmp_path,
 
     monkeypatch.setattr(ground_truth, "simulate_scene", draped)
     monkeypatch.setattr(training_motions, "Executor", lambda run, assets, workers: InProcess(run, assets))
+    monkeypatch.chdir(tmp_path)
+    Path("reports").touch()  # no folder of runs can be made here, nor is one needed
     out = tmp_path / "motions.h5"
     arguments = ["tshirt/training-motions", "--set", "sizes=smoke", "-o", str(out)]
     assert export.main(arguments) == 2
@@ -164,4 +167,4 @@ def test_training_motions_are_simulated_and_written_once_all_are_whole(tmp_path,
         motions = [group.attrs["name"] for group in file.values()]
     assert sorted(done) == sorted([*motions, "broken"]) and set(motions) <= set(TRAIN)
     assert f"{len(motions)} training motions of tshirt in {out}" in capsys.readouterr().out
-    assert [path.name for path in tmp_path.iterdir()] == ["motions.h5"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["motions.h5", "reports"]

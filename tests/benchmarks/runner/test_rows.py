@@ -60,8 +60,8 @@ CONVERGED = {"converged": np.array([1, 1, 0, 0.0])}
 def test_a_trajectory_is_judged_by_what_is_in_it_and_by_the_clock(changes, expected):
     changes = {"truncated": False, "complaint": "", **changes}
     reading = Reading((1.0,), changes.pop("complaint"))
-    truncated = changes.pop("truncated")
-    status, reason = judge(trajectory(**changes), reading, FOUR, truncated=truncated)
+    entry = dataclasses.replace(find_method("simulation"), truncated=changes.pop("truncated"))
+    status, reason = judge(trajectory(**changes), reading, FOUR, entry)
     assert status == expected[0] and reason.startswith(expected[1]) and bool(reason) == bool(expected[1])
 
 

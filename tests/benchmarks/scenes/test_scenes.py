@@ -13,14 +13,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from benchmarks.assets import (
-    Assets,
-    joint_speeds,
-    liveliest_part,
-    make_motions,
-    open_assets,
-    read_inputs,
-)
+from benchmarks.assets import Assets, joint_speeds, liveliest_part, make_motions, open_assets, read_inputs
 from benchmarks.presets import find_preset
 from benchmarks.runner.cache import dependencies
 from benchmarks.runner.schedule import tasks_of

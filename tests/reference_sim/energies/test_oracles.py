@@ -67,14 +67,10 @@ def test_springs_do_not_see_rigid_motion_and_their_forces_turn_with_it():
     assert max(np.abs(total).max(), np.abs(torque).max()) < 1e-12 * np.abs(gradient).sum()
 
 
-def triangle_of_3_4_5() -> Cloth:
-    """One triangle with sides of 0.3, 0.4 and 0.5 m, its right angle at the origin; its area is 0.06 m^2."""
-    return Cloth(np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.4, 0.0]]), np.array([[0, 1, 2]]))
-
-
 def test_springs_a_tenth_longer_have_the_energy_and_the_force_of_the_formula():
     """E = 15 N/m times the squares of 3, 4 and 5 cm; the force of a spring is 30 N/m times its stretch."""
-    cloth = triangle_of_3_4_5()
+    # One triangle with sides of 0.3, 0.4 and 0.5 m, its right angle at the origin.
+    cloth = Cloth(np.array([[0.0, 0.0, 0.0], [0.3, 0.0, 0.0], [0.0, 0.4, 0.0]]), np.array([[0, 1, 2]]))
     value, gradient = StretchSpring(cloth).value_and_gradient(1.1 * cloth.rest_positions)
     assert value == pytest.approx(15 * (0.03**2 + 0.04**2 + 0.05**2), rel=1e-12)
     assert gradient[0] == pytest.approx([-30 * 0.03, -30 * 0.04, 0], rel=1e-12)

@@ -14,12 +14,7 @@ import numpy as np
 import pytest
 import scipy.sparse
 
-from reference_sim.files.array_file import (
-    ArrayFileError,
-    read_arrays,
-    read_pickled_arrays,
-    write_array,
-)
+from reference_sim.files.array_file import ArrayFileError, read_arrays, read_pickled_arrays, write_array
 
 POSES = np.arange(12.0).reshape(4, 3)
 ARRAYS = {

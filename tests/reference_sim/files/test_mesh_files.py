@@ -122,6 +122,7 @@ def test_each_variant_of_a_format_is_the_same_square(tmp_path, name, content):
         ("a.obj", "v 0 0 0\nv 1 0 0\nv 0 1e300 0\nf 1 2 3\n", "vertex 2 is not finite, or farther than"),
         ("a.obj", SEAM + "f 1 2 9\n", "triangle 0 names a vertex beyond the 4"),
         ("a.obj", SEAM + "f 1/1 2/2 3/7\n", "triangle 0 names a texture coordinate beyond the 6"),
+        ("a.obj", SEAM + "f 1/1 2/2 3/-7\n", "line 12"),
         ("a.obj", SEAM + "f 1 2 3 4 1\n", "face 0 has 5 corners: triangulate"),
     ],
 )

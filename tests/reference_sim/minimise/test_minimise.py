@@ -32,12 +32,6 @@ def gradient_by_torch(potential: Potential, x: np.ndarray) -> np.ndarray:
     return variable.grad.numpy()
 
 
-def free_hessian(potential: Potential, x: np.ndarray) -> np.ndarray:
-    """Dense, over the free vertices, from the definitions alone."""
-    rows = np.repeat(potential.cloth.free, 3)
-    return dense_sum(potential.energies, x)[np.ix_(rows, rows)]
-
-
 def assert_minimum(potential: Potential, x0: np.ndarray, result: Result) -> None:
     """Pins still, gradient small and no negative curvature, by another way than the minimiser's own."""
     x, pins = result.positions, potential.cloth.pins
@@ -49,7 +43,8 @@ def assert_minimum(potential: Potential, x0: np.ndarray, result: Result) -> None
     assert norm <= TOLERANCE
     # The two gradients differ by round-off of forces of 1 N in vertices of 1e-3 N.
     assert result.gradient_norm == pytest.approx(norm, abs=1e-9)
-    values = np.linalg.eigvalsh(free_hessian(potential, x))
+    rows = np.repeat(potential.cloth.free, 3)
+    values = np.linalg.eigvalsh(dense_sum(potential.energies, x)[np.ix_(rows, rows)])
     assert values[0] > -1e-10 * values[-1]
     assert result.energy == pytest.approx(potential.value(x), rel=1e-12, abs=1e-20)
     assert sum(result.terms.values()) == pytest.approx(result.energy, rel=1e-9, abs=1e-20)

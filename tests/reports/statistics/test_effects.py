@@ -177,9 +177,11 @@ def test_positive_numbers_are_compared_by_their_factors():
     assert 0.0 < low < ratio.shown < high < 1.0
     back = effect(broken, sound)
     assert np.log(back.interval) == pytest.approx(-np.log((high, low)), rel=3 * NOISE)
-    # A claimed factor lies on the interval's end where its p-value is the level.
-    assert ratio.p_value(factor=1.0 / high) == pytest.approx(0.05)
-    assert ratio.p_value(factor=1.01 / high) > 0.05 > ratio.p_value(factor=0.99 / high)
+    # Where the interval ends at zero the p-value is the level.
+    at_end, inside, outside = (
+        replace(ratio, value=ratio.value - np.log(x * high)) for x in (1, 0.99, 1.01)
+    )
+    assert at_end.p_value() == pytest.approx(0.05) and inside.p_value() > 0.05 > outside.p_value()
     assert effect(mean_over((0.0, 1.0)), mean_over((1.0, 1.0), "pbns")).scale == DIFFERENCE
 
 

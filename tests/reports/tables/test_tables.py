@@ -8,7 +8,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from reports.blocks import BLOCKS, Heading
+from reports.blocks import BLOCKS
 from reports.pdf import lay_out_table
 from reports.statistics.means_and_spreads import Mean, mean_of, pair
 from reports.tables import make_tables
@@ -123,5 +123,5 @@ def test_each_frame_weighs_the_same_on_the_papers_clips_and_on_all_motions():
     assert ["Below: the reference" in caption for caption in captions] == [True, False]
     full = [r for r in rows if r.method != "snug-paper-no-strain"]
     assert len(paper_tables(replace(run_of(full), frame_energies=frames))) == 1
-    heading = next(place for place, block in enumerate(BLOCKS) if isinstance(block, Heading))
+    heading = next(place for place, block in enumerate(BLOCKS) if isinstance(block, str))
     assert {table.name for table in made} < {block.name for block in BLOCKS[:heading]}  # page one

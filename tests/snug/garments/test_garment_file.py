@@ -205,6 +205,8 @@ def test_a_seam_is_joined_but_refused_where_a_program_left_it_open(tmp_path, bod
 def test_a_word_that_means_nothing_is_refused():
     for words, expected in (
         ("uv_scale=2", "add rest=uv"),
+        ("rest=uv,uv_scale=-1", "a number above 0"),
+        ("path=other.obj", "no word is called 'path'"),
         ("units=km", "units=km: choose from m, cm, mm"),
         ("weld=0", "give a distance above 0"),
     ):

@@ -45,7 +45,7 @@ def test_a_compiled_frame_is_the_modules_own_and_that_of_its_file(kind, tmp_path
     positions = roll_out(model, tube_dress(), motion).positions
     loaded = TrainedModel.load(model.save(tmp_path / "model.safetensors"))
     assert np.array_equal(roll_out(loaded, tube_dress(), motion).positions, positions)
-    assert loaded.megabytes == model.megabytes
+    assert loaded.network.megabytes == model.network.megabytes
     size = np.abs(offsets).max()
     assert size > 0.03 and (offsets[:, PINS] == 0.0).all()
     assert np.abs(positions - expected).max() < 3e-6 * max(size, 1.0)

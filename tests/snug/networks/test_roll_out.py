@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from snug.networks.garment_network import make_network
-from snug.networks.roll_out import RollOutError, prepare_frame_inputs, prepare_frames, roll_out
+from snug.networks.roll_out import prepare_frame_inputs, prepare_frames, roll_out
 from snug.networks.trained_model import TrainedModel
 from snug.recipe import DEFAULT
 from tests.snug.training.dressing import random_model, swaying, tube_dress
@@ -66,6 +66,6 @@ def test_misfits_of_vertices_triangles_and_rate_are_named():
         (replace(snug, triangles="another"), motion, "as many vertices and other triangles"),
         (snug, fast, r"learned from 30 frames a second, motion .* has 60: resample"),
     ):
-        with pytest.raises(RollOutError, match=message):
+        with pytest.raises(ValueError, match=message):
             roll_out(model, dressed, moved)
     roll_out(pbns, dressed, fast)  # a pose has no rate

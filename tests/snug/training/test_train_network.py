@@ -9,7 +9,7 @@ from safetensors.torch import save_file
 
 from snug.named_recipes import PAPER, SUPERVISED
 from snug.networks import trained_model
-from snug.networks.trained_model import ModelFileError, TrainedModel
+from snug.networks.trained_model import TensorFileError, TrainedModel
 from snug.recipe import DEFAULT
 from snug.train import choose_motions, main, parse_options
 from snug.training.augmentation import augment
@@ -58,10 +58,10 @@ def test_files_that_are_no_models_are_named(tmp_path, monkeypatch):
     monkeypatch.setattr(trained_model, "MODEL_FORMAT", "snug-model-5")
     random_model("pbns", tube_dress(), [swaying()], seed=0).save(old)
     monkeypatch.undo()
-    with pytest.raises(ModelFileError, match="no model of this project"):
+    with pytest.raises(TensorFileError, match="no model of this project"):
         TrainedModel.load(foreign)
     with pytest.raises(
-        ModelFileError, match=r"old\.safetensors: format 'snug-model-5', this version reads"
+        TensorFileError, match=r"old\.safetensors: format 'snug-model-5', this version reads"
     ):
         TrainedModel.load(old)
 

@@ -1,6 +1,6 @@
 """Distance from simulated vertices and energies in one loss."""
 
-from dataclasses import replace
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -49,5 +49,5 @@ def test_without_lambda_training_files_and_digests_are_those_on_vertices_alone()
     plain, none = (short("supervised", recipe=recipe).network.state_dict() for recipe in recipes)
     assert all(torch.equal(plain[name], none[name]) for name in plain)
     added = ("physics_weight", "turn")
-    older = {name: value for name, value in DEFAULT.as_dict().items() if name not in added}
+    older = {name: value for name, value in asdict(DEFAULT).items() if name not in added}
     assert Recipe.from_dict(older) == DEFAULT and digest(DEFAULT) == digest(older) != digest(SUPERVISED)
