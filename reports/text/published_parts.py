@@ -171,7 +171,10 @@ def run_rows(folders: Sequence[Path]) -> Rows:
 
 
 def _overview(folders: Sequence[Path], columns: Sequence[str], methods: Sequence[str]) -> Rows:
-    """Return the table of page one with these methods, each from the first run that has it."""
+    """Return the table of page one with these methods, each from the first run that has it.
+
+    A star stands behind the methods of other runs than the first.
+    """
     heads: list[str] = []
     rows: dict[str, list[str]] = {}
     for run in map(read_published, folders):
@@ -182,7 +185,10 @@ def _overview(folders: Sequence[Path], columns: Sequence[str], methods: Sequence
                 f"page one has the columns {', '.join(head)} in one of {', '.join(map(str, folders))}"
             )
         heads = head
-        rows |= dict(zip(run.order(missing), lines))
+        star = "*" * bool(rows)
+        rows |= {
+            method: [f"{line[0]}{star}", *line[1:]] for method, line in zip(run.order(missing), lines)
+        }
     return [heads, *(rows[name] for name in methods)]
 
 
