@@ -37,7 +37,7 @@ Files, as far as the scene has what they hold:
   energies.npz       elements of each energy term: vertices, stiffness, rest state; formulas in
                      docs/method.md
   obstacle.npz       positions (T,B,3) of what the cloth touches, one frame where it stands still, faces;
-                     rest_positions (B,3), the body unposed
+                     rest_positions (B,3), the unposed body that the garment was made for
   motion_smpl.npz    poses (T,72) [rad], trans (T,3), betas, fps: SMPL's 24 joints, y up. Of a part of a
                      motion poses_before, trans_before, the frames until then: the start has the
                      velocities with which a simulation of them ends
@@ -79,7 +79,7 @@ def write_scene_files(part: Path, scene: BuiltScene, facts: dict[str, Any]) -> N
     if obstacle is not None:
         _write_arrays(
             part / "obstacle.npz", positions=obstacle.positions, faces=obstacle.faces, fps=1.0 / scene.dt,
-            rest_positions=None if dressed is None else dressed.body.rest_vertices(dressed.betas),
+            rest_positions=None if dressed is None else dressed.body.rest_vertices(),
         )  # fmt: skip
     if dressed is not None:
         write_motion(part, dressed)

@@ -190,10 +190,10 @@ CURVATURE = Measurements(
     "curvature",
     metrics_of(
         ("curvature/mean", "1/m", "Mean curvature",
-         "magnitude of the mean curvature (cotangent Laplacian over mixed Voronoi areas), mean over interior "
-         "vertices by area and over frames"),
+         "H, magnitude of the mean curvature (cotangent Laplacian over mixed Voronoi areas), mean over "
+         "interior vertices by area and over frames"),
         ("curvature/histogram", "1/m", "Curvature, distribution",
-         "Wasserstein-1 distance between the area-weighted distributions of H at the same frame",
+         "Wasserstein-1 distance between the area-weighted distributions of H in each frame, mean",
          {"lower_is_better": True}),
         ("curvature/mean_difference", "1/m", "Difference of means",
          "area-weighted mean of H less that of the reference"),

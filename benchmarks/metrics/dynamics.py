@@ -205,7 +205,7 @@ DYNAMICS = Measurements(
          "root mean square distance of all vertices to the method's own quasi-static solution"),
         ("dynamics/correlation", "1", "Hem correlation",
          "cosine between the dynamic parts of method and simulation: the hem's motion in the axes of the "
-         "root, less the method's own quasi-static solution, less its mean over time"),
+         "root, less the method's own quasi-static solution, less each vertex's mean"),
         ("dynamics/amplitude", "1", "Hem amplitude",
          "root mean square of the hem's dynamic part, divided by the simulation's; says nothing without the "
          "correlation, an untrained network has one too"),

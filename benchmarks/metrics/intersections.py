@@ -115,8 +115,8 @@ INTERSECTIONS = Measurements(
          "length of the lines in which triangles of the cloth pass through others of it without a common "
          "vertex, mean over frames"),
         ("intersections/swept", "1", "Swept",
-         "pairs of a vertex and a triangle, or of two edges, of the cloth that pass through each other on "
-         "straight ways between two frames; mean over 12 pairs of frames, needs ipctk"),
+         "pairs of a vertex and a triangle, or of two edges, without a common vertex that meet on straight "
+         "ways to the next frame; mean over 12 steps, needs ipctk"),
         table="intersections", lower_is_better=True,
     ),
     measure=lambda roll_out: measure_triangles(roll_out) | measure_swept(roll_out),

@@ -200,8 +200,8 @@ GEOMETRY = Measurements(
         ("penetration/vertices", "%", "Penetration",
          "vertices inside the body (winding number above 0), none left out, mean over frames"),
         ("penetration/surface", "%", "Surface inside",
-         "share of the cloth's present area inside the body: of a triangle's a vertex stands for 1/20, the "
-         "midpoint of a side for 2/15, the centroid for 9/20; mean over frames"),
+         "share of the cloth's present area inside the body: in a triangle each vertex counts 1/20, each "
+         "side's midpoint 2/15, the centroid 9/20; mean over frames"),
         ("penetration/deep", "%", "Deep", "vertices more than 5 mm inside the body"),
         ("penetration/depth_p99", "mm", "Depth, 99 %",
          "99 % of all vertices and frames are less deep; 0 outside", {"table": ""}),

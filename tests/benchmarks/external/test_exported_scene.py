@@ -15,7 +15,7 @@ from scipy.linalg import expm
 
 from benchmarks import export
 from benchmarks.external.roll_out_files import RollOutOption, expected_positions
-from benchmarks.external.scene_files import write_motion, write_scene
+from benchmarks.external.scene_files import write_motion, write_scene, write_scene_files
 from benchmarks.methods import find_method
 from benchmarks.methods.outside import entry_of
 from benchmarks.metric import RollOut, SceneRollOuts
@@ -159,7 +159,7 @@ def test_the_authors_network_is_given_what_it_reads_in_its_order(home, tmp_path)
     assert np.abs(written["positions"] - expected).max() < 1e-5
 
 
-def test_what_is_exported_is_the_scene(home):
+def test_what_is_exported_is_the_scene(home, tmp_path):
     folder, scene = home
     cloth, rest = arrays(folder / "cloth.npz"), read_mesh(folder / "rest.obj")
     for written, own in (
@@ -175,6 +175,9 @@ def test_what_is_exported_is_the_scene(home):
     text = (folder / "README.txt").read_text()
     assert all(path.name in text for path in folder.iterdir() if path.suffix in (".npz", ".json"))
     assert not list(folder.parent.glob(".*part"))
+    body, dressed = scene.dressed.body, dataclasses.replace(scene.dressed, betas=np.ones(10))
+    write_scene_files(tmp_path, dataclasses.replace(scene, dressed=dressed), facts)
+    assert np.array_equal(arrays(tmp_path / "obstacle.npz")["rest_positions"], body.rest_vertices())
 
 
 def exported(folder: Path):

@@ -79,8 +79,7 @@ def texts(canvas) -> tuple[list[Text], list[Text]]:
         for axis in (axes.xaxis, axes.yaxis):
             low, high = sorted(axis.get_view_interval())
             ticks = (*axis.get_major_ticks(), *axis.get_minor_ticks())
-            ticks = [tick for tick in ticks if low <= tick.get_loc() <= high]
-            around += [axis.label, *(tick.label1 for tick in ticks)]
+            around += [axis.label, *(t.label1 for t in ticks if low <= t.get_loc() <= high)]
     written = [text for axes in canvas.axes for text in axes.texts]
     return tuple(
         [t for t in some if t.get_visible() and t.get_text().strip()] for some in (around, written)
