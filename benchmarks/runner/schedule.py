@@ -197,8 +197,7 @@ class Schedule:
     def training(self, network: Network) -> NetworkTraining:
         """Return how a network is trained."""
         motions, chosen = self.plan.motions.train, network.training.at(self.preset)
-        of_kind = self.preset.steps.get(chosen.kind, 0)
-        steps = self.preset.steps.get(network.name, of_kind)
+        steps = self.preset.steps.get(network.name, self.preset.steps.get(chosen.kind, 0))
         inputs = self._machine(self.plan.study.device) | self._list_body(network.garment)
         if chosen.packaged:  # of the package's training clips, which are whole
             inputs["assets"]["train_frames"] = find_preset("quick").train_frames

@@ -121,7 +121,7 @@ class StepMinimiser:
     def minimise(self, x: np.ndarray, guess: np.ndarray) -> Result:
         """Minimise the step that starts at x (V, 3) [m], from `guess` (V, 3) [m] or from as near as x comes.
 
-        Counts of the result are those of all its minimisations together. Terms that join late are left
+        Counts of the result are those of all its minimisations together. Dynamic terms are left
         out first, and stay out unless they have something to say: the minimum without them is the answer
         if the way there is free and they are zero around it. If not, the minimisation with them starts on
         the way there: from `guess` on if that can be reached, else from x on. Cloth meets itself late on
