@@ -24,7 +24,6 @@ from reference_sim.trajectory import Trajectory
 from snug.networks.dressed_body import DressedBody
 from snug.networks.roll_out import prepare_batch, prepare_frame_inputs, prepare_roll_out, roll_out
 from snug.networks.trained_model import TrainedModel
-from snug.trained import list_networks
 from snug.training.contact_cache import Patch
 
 MARGIN = 2e-3  # [m]
@@ -70,7 +69,7 @@ class Network(Method):
     each frame is post-processed; the body is then posed before run() too.
     """
 
-    path: Path | None = None
+    path: Path | str | None = None  # or its name in the package
     cleanup: bool = False
     clean: CollisionPostProcessing | None = field(default=None, init=False)
 
@@ -133,7 +132,7 @@ def make_network(
     *, models: Path, seed: int, kind: str, cleanup: bool = False, packaged: str = ""
 ) -> Network:
     """Make the network of that name and seed, or the one of that name in the package."""
-    return Network(list_networks()[packaged] if packaged else model_path(models, kind, seed), cleanup)
+    return Network(packaged or model_path(models, kind, seed), cleanup)
 
 
 def make_skinning(*, models: Path, seed: int) -> Network:

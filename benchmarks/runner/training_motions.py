@@ -30,6 +30,7 @@ def write_training_motions(garment: str, options: argparse.Namespace, out: Path)
     """
     study = study_of(options, "full:garments")
     run = RunFolder(out.with_name(f"{out.name}.parts"))
+    # A plan wants a new folder that can be made; nothing is written there.
     plan = make_plan(
         replace(study, scenes=(f"{garment}/*",), methods=(LEARNER,)), folder=run.path / "new"
     )
