@@ -108,9 +108,10 @@ def as_before():
     path, modules = list(sys.path), set(sys.modules)
     yield
     sys.path[:] = path
+    installed = (str(Path(run.__file__).parent.parent), sys.prefix, *filter(None, path))
     for name in set(sys.modules) - modules:
         file = getattr(sys.modules[name], "__file__", None) or sys.prefix  # of torch, written in C
-        if not file.startswith((str(Path(run.__file__).parent.parent), sys.prefix, sys.base_prefix)):
+        if not file.startswith(installed):
             del sys.modules[name]
     metrics.list_metrics.cache_clear()
     forget()
