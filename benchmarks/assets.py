@@ -99,8 +99,8 @@ def _read_motions(files: Sequence[str], options: MotionFileOptions | None) -> di
             if motion.name in motions or (motion.name in MADE and motion.name not in CLIPS):
                 raise MotionError(f"--motions {path}: the name '{motion.name}' is taken; rename the file")
             if motion.frames < FEWEST_FRAMES:
-                few = f"{motion.frames} frames; at least {FEWEST_FRAMES} are needed"
-                raise MotionError(f"--motions {path}: {few}")
+                fault = f"{motion.frames} frames; at least {FEWEST_FRAMES} are needed"
+                raise MotionError(f"--motions {path}: {fault}")
             motions[motion.name] = motion
     return motions
 
@@ -123,11 +123,11 @@ class Assets:
 
     def motion(self, name: str, part: str) -> Motion:
         """Return the whole motion of that name, or its clip, named "<motion>@clip"."""
-        whole = self.motions[name]
+        motion = self.motions[name]
         if part != "clip":
-            return whole
+            return motion
         frames = self.clips[name]
-        return replace(whole.cut(frames.start, frames.stop), name=f"{name}@clip")
+        return replace(motion.cut(frames.start, frames.stop), name=f"{name}@clip")
 
     def cut_before(self, name: str, part: str) -> Motion | None:
         """Return the motion before that part; None where the part begins with the motion."""

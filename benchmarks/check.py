@@ -143,7 +143,7 @@ def faults_of(plan: Plan) -> Iterator[tuple[str, str]]:
         yield cell.scene.name if own_scene else f"{name} in {cell.scene.name}", fault
 
 
-def run_checked(cell: Cell, min_time: float, context: Context, needed: Needed) -> Outcome:
+def run_checked(cell: Cell, min_time: float, context: Context, outcomes: Needed) -> Outcome:
     """Run a cell, and check what a user's scene and method do.
 
     Raises ContractError, for what a user's code raises with file and line.

@@ -87,9 +87,9 @@ def evaluate(plan: Plan, references: Mapping[str, Reference] | None = None) -> R
 
 def assets_of(plan: Plan) -> Assets | None:
     """Open body, garments and the motions of the scenes alone; None without a dressed scene."""
-    read = plan.inputs.motions
+    user_motions = plan.inputs.motions
     names = dict.fromkeys(scene.motion for scene in plan.scenes if scene.dressed)
-    motions = [read[name] if name in read else make_motions([name])[0] for name in names]
+    motions = [user_motions[name] if name in user_motions else make_motions([name])[0] for name in names]
     if not names:
         return None
     sizes, ready = plan.study.sizes, load_garment(plan)

@@ -56,8 +56,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         if folder.is_dir():
             raise StudyError(f"{folder}: is a folder; name a file, as motions.h5")
-        written = write_training_motions(garment, options, folder)
-        print(f"{len(written)} training motions of {garment} in {folder}")
+        motions = write_training_motions(garment, options, folder)
+        print(f"{len(motions)} training motions of {garment} in {folder}")
         return 0
     demand_new(folder)
     study = replace(study_of(options), scenes=(options.scene,), methods=("simulation",))

@@ -154,12 +154,12 @@ class Kept:
         """Return make(self), computed at the first call."""
         if make not in self._made:
             self._made[make] = make(self)
-        made = self._made[make]
-        return made.result() if isinstance(made, Future) else made
+        entry = self._made[make]
+        return entry.result() if isinstance(entry, Future) else entry
 
-    def keep(self, make: Callable[[Any], Made], made: Future[Made]) -> None:
+    def keep(self, make: Callable[[Any], Made], future: Future[Made]) -> None:
         """Take what another process computes in place of make(self)."""
-        self._made[make] = made
+        self._made[make] = future
 
 
 @dataclass(eq=False)

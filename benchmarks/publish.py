@@ -150,22 +150,22 @@ def publish(name: str, out: Path, into: Path, head: str) -> None:
     Raises ResultsError where the run failed, has rows of another commit than `head`, or lacks a picture
     that the documents show.
     """
-    show, whole = read_study(name).show, out / Path(name).stem
+    show, source = read_study(name).show, out / Path(name).stem
     assert show is not None
     seeds = ["--seeds", ",".join(map(str, show.seeds))] if show.seeds else []  # see with_seeds
     # Again what has failed, as a task that lacked memory once.
-    _call("benchmarks.run", name, *seeds, "--retry", "-o", str(whole))
-    if not all_usable(RunFolder(whole)):
-        raise ResultsError(f"{whole}: has failed")
-    if others := sorted({row.commit for row in RunFolder(whole).read_rows()} - {head, ""}):
-        fault = f"{whole}: rows of commit {', '.join(others)}"
+    _call("benchmarks.run", name, *seeds, "--retry", "-o", str(source))
+    if not all_usable(RunFolder(source)):
+        raise ResultsError(f"{source}: has failed")
+    if others := sorted({row.commit for row in RunFolder(source).read_rows()} - {head, ""}):
+        fault = f"{source}: rows of commit {', '.join(others)}"
         raise ResultsError(f"{fault}; remove the folder, or check that commit out")
     for film, options in show.films.items():
-        path = whole / "figures" / film
+        path = source / "figures" / film
         path.unlink(missing_ok=True)
-        _call("reports.film", str(whole), *shlex.split(options), "-o", str(path))
-    keep(whole, into / whole.name, show)
-    print(f"{name}: published in {into / whole.name}", flush=True)
+        _call("reports.film", str(source), *shlex.split(options), "-o", str(path))
+    keep(source, into / source.name, show)
+    print(f"{name}: published in {into / source.name}", flush=True)
 
 
 def _call(*command: str) -> None:
@@ -186,17 +186,17 @@ def all_usable(folder: RunFolder) -> bool:
     return bool(config.get("finished")) and all(counted) and not any(failed)
 
 
-def keep(whole: Path, target: Path, show: Show) -> None:
-    """Replace the folder `target` by what is published of the run in `whole`.
+def keep(source: Path, target: Path, show: Show) -> None:
+    """Replace the folder `target` by what is published of the run in `source`.
 
     Raises ResultsError where a picture, film or network of `show` is not there.
     """
-    networks = [model_path(RunFolder(whole).models, name, seed=0) for name in show.networks]
-    files = [whole / name for name in KEPT] + [whole / "figures" / name for name in show.files]
-    tables = [path for path in (whole / "tables").glob("*.csv") if not path.match("*_by_scene.csv")]
-    packed = [path for name in PACKED if (path := whole / name).exists() or name == PACKED[0]]
-    if missing := [path for path in (*files, *packed, *networks) if not path.exists()]:
-        raise ResultsError(f"{missing[0]}: not there, and the study publishes it")
+    networks = [model_path(RunFolder(source).models, name, seed=0) for name in show.networks]
+    files = [source / name for name in KEPT] + [source / "figures" / name for name in show.files]
+    tables = [path for path in (source / "tables").glob("*.csv") if not path.match("*_by_scene.csv")]
+    packed = [path for name in PACKED if (path := source / name).exists() or name == PACKED[0]]
+    if missing_files := [path for path in (*files, *packed, *networks) if not path.exists()]:
+        raise ResultsError(f"{missing_files[0]}: not there, and the study publishes it")
     draft = target.with_name(f"{target.name}.new")
     shutil.rmtree(draft, ignore_errors=True)
     with new_folder(draft) as part:
@@ -208,7 +208,7 @@ def keep(whole: Path, target: Path, show: Show) -> None:
         for path in tables:
             shutil.copy(path, part / "tables")
         for path in networks:
-            save_half(path, part / path.relative_to(whole))
+            save_half(path, part / path.relative_to(source))
     shutil.rmtree(target, ignore_errors=True)
     draft.rename(target)
 

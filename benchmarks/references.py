@@ -160,5 +160,5 @@ def _pack(numbers: NDArray[np.int64]) -> NDArray[np.uint8]:
 
 
 def _unpack(packed: NDArray[np.uint8]) -> NDArray[np.int64]:
-    whole = np.ascontiguousarray(np.moveaxis(packed, 0, -1)).view("<u4")[..., 0].astype(np.int64)
-    return (whole >> 1) ^ -(whole & 1)
+    codes = np.ascontiguousarray(np.moveaxis(packed, 0, -1)).view("<u4")[..., 0].astype(np.int64)
+    return (codes >> 1) ^ -(codes & 1)

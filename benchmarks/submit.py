@@ -255,8 +255,8 @@ def write_scores(entry: Entry, run: RunFolder) -> int:
 
 def sample(positions: Positions) -> Floats:
     """Return some vertices of each frame about their centre, (T,N) [m]."""
-    few = positions[:, :: max(positions.shape[1] // VERTICES, 1)]
-    return (few - few.mean(axis=1, keepdims=True)).reshape(len(few), -1).astype(np.float32)
+    points = positions[:, :: max(positions.shape[1] // VERTICES, 1)]
+    return (points - points.mean(axis=1, keepdims=True)).reshape(len(points), -1).astype(np.float32)
 
 
 def find_copies(entry: Entry, samples: dict[str, Floats]) -> None:
@@ -277,9 +277,9 @@ def find_copies(entry: Entry, samples: dict[str, Floats]) -> None:
             if theirs.shape[1] != frames.shape[1]:
                 continue
             gaps = cdist(frames, theirs) / math.sqrt(frames.shape[1] / 3)
-            same, nearest = gaps.min(axis=1) <= SAME, gaps.argmin(axis=1)
-            if same.mean() >= COPIED:
-                order = np.sign(np.diff(nearest[same]).mean())
+            matches, nearest = gaps.min(axis=1) <= SAME, gaps.argmin(axis=1)
+            if matches.mean() >= COPIED:
+                order = np.sign(np.diff(nearest[matches]).mean())
                 way = {0.0: "one of them held", 1.0: "in order", -1.0: "in reverse"}[float(order)]
                 copied = f"its frames are those of {' '.join(whose)}, {way}"
                 raise StudyError(f"{entry.path}: {name}: {copied}")

@@ -76,7 +76,7 @@ def time_run(
     gc.collect()  # what preparing has left is not charged to the run
     before = set(threading.enumerate())
     children = set(multiprocessing.active_children())
-    used, runs, last = 0.0, [], None
+    cpu_time, runs, last = 0.0, [], None
     while True:
         with _compilations() as compiled:
             _synchronise()
@@ -89,7 +89,7 @@ def time_run(
             last = result
             continue
         runs.append(seconds)
-        used += busy
+        cpu_time += busy
         if last is not None and np.may_share_memory(np.asarray(read(last)), np.asarray(read(result))):
             fault = "run() gave again what it had given before: each call of run() has to do all of the "
             return result, Reading(tuple(runs), fault + "work, and to return an array of its own")
@@ -97,9 +97,9 @@ def time_run(
             break
         last = result  # held beyond the next run, so that what is new lies elsewhere
     seconds = sum(runs)
-    if used > CROWDED * seconds + GRAIN:
-        crowd = f"{used:.2f} s of processor time in {seconds:.2f} s: more than one thread has worked: "
-        crowd += "leave the number of threads alone: one is set, see OMP_NUM_THREADS"
+    if cpu_time > CROWDED * seconds + GRAIN:
+        crowd = f"{cpu_time:.2f} s of processor time in {seconds:.2f} s: more than one thread has "
+        crowd += "worked: leave the number of threads alone: one is set, see OMP_NUM_THREADS"
         return result, Reading(tuple(runs), crowd)
     late = _watch_process(read(result), before, children)
     late += ": wait in run() for all threads, processes and devices; leave none behind" if late else ""
@@ -128,9 +128,9 @@ def _watch_process(
 
     crc = zlib.crc32(np.asarray(positions).tobytes())
     for _ in range(WATCHES):
-        used, clock = time.process_time(), time.perf_counter()
+        start, clock = time.process_time(), time.perf_counter()
         time.sleep(AFTER)
-        busy = (time.process_time() - used) / (time.perf_counter() - clock)
+        busy = (time.process_time() - start) / (time.perf_counter() - clock)
         if zlib.crc32(np.asarray(positions).tobytes()) != crc:
             return "positions still changed after run() had come back"
         if busy <= BUSY:

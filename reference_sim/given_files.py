@@ -62,6 +62,6 @@ def check_values(table: Mapping[str, Any]) -> None:
             for value in level
             if isinstance(value, dict | list)
         )
-        level = [held for values in lists for held in values]
+        level = [item for values in lists for item in values]
     if level:
         raise ValueError(f"tables or lists more than {DEEPEST} deep")

@@ -114,11 +114,11 @@ class Obstacle:
         """Return the vertices (B, 3) [m] at `frame` from 0 on; the last frame holds on for ever."""
         if frame < 0:
             raise ValueError(f"obstacle: frame {frame}: frames count from 0")
-        whole, part = divmod(min(frame, self.frames - 1), self._substeps)
+        index, part = divmod(min(frame, self.frames - 1), self._substeps)
         if part == 0:
-            return self.positions[whole]
+            return self.positions[index]
         share = part / self._substeps
-        return (1 - share) * self.positions[whole] + share * self.positions[whole + 1]
+        return (1 - share) * self.positions[index] + share * self.positions[index + 1]
 
     def refine(self, substeps: int) -> Obstacle:
         """Return the same motion, linear in between, with `substeps` frames for each frame here."""
@@ -185,12 +185,12 @@ class Obstacle:
             *self._around, normals,
         )  # fmt: skip
         if margin is not None and len(tilted):
-            some = points[tilted]
+            tilted_points = points[tilted]
             assert self._search is not None
-            nearest = self._search.nearest(some, hints=closest.faces[tilted]).points
-            free = np.linalg.norm(some - nearest, axis=1) > margin
-            free[free] = winding_numbers(vertices, self.faces, some[free]) <= 0
-            offsets = (some - closest.points[tilted])[free]
+            nearest = self._search.nearest(tilted_points, hints=closest.faces[tilted]).points
+            free = np.linalg.norm(tilted_points - nearest, axis=1) > margin
+            free[free] = winding_numbers(vertices, self.faces, tilted_points[free]) <= 0
+            offsets = (tilted_points - closest.points[tilted])[free]
             normals[tilted[free]] = offsets / np.linalg.norm(offsets, axis=1)[:, None]
         return Planes(closest.points, normals, closest.faces, closest.barycentric)
 

@@ -81,17 +81,17 @@ class HessianPattern:
         """
         if not changing:
             return self
-        needed = np.unique(np.concatenate([self._keys_of(matrix)[0] for matrix in changing]))
-        needed = np.setdiff1d(needed, self._fixed._key, assume_unique=True)
-        if not len(np.setdiff1d(needed, self._key, assume_unique=True)):
+        blocks = np.unique(np.concatenate([self._keys_of(matrix)[0] for matrix in changing]))
+        blocks = np.setdiff1d(blocks, self._fixed._key, assume_unique=True)
+        if not len(np.setdiff1d(blocks, self._key, assume_unique=True)):
             return self
         spare = np.setdiff1d(self._key, self._fixed._key, assume_unique=True)
-        if len(spare) < SPARE_BLOCKS * len(needed):
-            needed = np.union1d(spare, needed)
+        if len(spare) < SPARE_BLOCKS * len(blocks):
+            blocks = np.union1d(spare, blocks)
         wider = copy.copy(self._fixed)
         for cached in ("order", "_constant"):
             wider.__dict__.pop(cached, None)
-        key = np.union1d(self._fixed._key, needed)
+        key = np.union1d(self._fixed._key, blocks)
         moved = np.append(np.searchsorted(key, self._fixed._key), -1)  # slot -1, not stored, stays -1
         wider._slots = [moved[slots] for slots in self._fixed._slots]
         wider._lay_out(key)

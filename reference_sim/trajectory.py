@@ -100,8 +100,8 @@ class Trajectory:
 
     def finite(self) -> Trajectory:
         """Return the frames before the first in which a position is not finite."""
-        whole = np.isfinite(self.positions).all(axis=(1, 2))
-        count = len(whole) if whole.all() else int(np.argmin(whole))
+        mask = np.isfinite(self.positions).all(axis=(1, 2))
+        count = len(mask) if mask.all() else int(np.argmin(mask))
         return replace(
             self, positions=self.positions[:count], times=self.times[:count],
             frame_seconds=self.frame_seconds[:count],

@@ -51,11 +51,11 @@ def _intersect(frames: Sequence[pd.DataFrame], *columns: str) -> list[pd.DataFra
 def find_losses(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
     """Return a line for each method or metric that the later run lacks somewhere."""
     keys = [frame.set_index(CELL).index for frame in (one, other)]
-    missing = one[one["usable"] & ~keys[0].isin(keys[1])].astype({"method": str, "metric": str})
-    lacking = missing.set_index(CELL[:3]).index.isin(other.set_index(CELL[:3]).index)
-    missing["metric"] = missing["metric"].where(lacking, "all metrics")
+    losses = one[one["usable"] & ~keys[0].isin(keys[1])].astype({"method": str, "metric": str})
+    lacking = losses.set_index(CELL[:3]).index.isin(other.set_index(CELL[:3]).index)
+    losses["metric"] = losses["metric"].where(lacking, "all metrics")
     changes = []
-    for (method, metric), rows in missing.groupby(["method", "metric"], sort=False):
+    for (method, metric), rows in losses.groupby(["method", "metric"], sort=False):
         places, seeds = (", ".join(map(str, rows[name].unique())) for name in ("place", "seed"))
         size = f"not in the later run: {rows['scene'].nunique()} scenes, seeds {seeds}"
         changes.append(Change(GONE, places, method, metric, size))
@@ -64,17 +64,17 @@ def find_losses(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
 
 def endings(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
     """Return cells, checks and stress tests that ended well in one run alone; each cell once."""
-    both = one.merge(other, on=CELL, suffixes=("", "_other"))
+    pairs = one.merge(other, on=CELL, suffixes=("", "_other"))
     # Whatever the later run says; an engine that was off before violates a law, which is a result.
     off, was_off = (
-        ((both[f"value{end}"] - both["expected"]).abs() > both["tolerance"])
-        & (both[f"status{end}"] == "ok")
+        ((pairs[f"value{end}"] - pairs["expected"]).abs() > pairs["tolerance"])
+        & (pairs[f"status{end}"] == "ok")
         for end in ("_other", "")
     )
-    both.loc[off & ~was_off, ["status_other", "reason_other"]] = "failed", "off"
+    pairs.loc[off & ~was_off, ["status_other", "reason_other"]] = "failed", "off"
     # A cell that failed has one row, of a metric that it need not have where it ends well.
     cells = _pick_worst(one).merge(_pick_worst(other), on=CELL[:3], suffixes=("", "_other"))
-    rows = pd.concat([both, cells], ignore_index=True)
+    rows = pd.concat([pairs, cells], ignore_index=True)
     good, good_other = rows["status"] == "ok", rows["status_other"] == "ok"
     moved = rows[good != good_other].drop_duplicates([*CELL[:3], "status", "status_other"])
     return [
@@ -158,12 +158,12 @@ def compare(
         machines = [m.name for run in (one, other) for m in run.metrics.values() if m.of == "machine"]
         of_metrics = [frame[~frame["metric"].isin(machines)] for frame in of_metrics]
     losses = [] if shared else find_losses(*of_metrics)
-    both = _intersect(of_metrics, *CELL)
-    if both[0].empty:
+    pair = _intersect(of_metrics, *CELL)
+    if pair[0].empty:
         raise ResultsError(
             "the two runs share no such scene, method, seed and metric: nothing to compare"
         )
-    before, after = (frame.set_index(CELL)["protocol"] for frame in both)
+    before, after = (frame.set_index(CELL)["protocol"] for frame in pair)
     clashes = before[before != after.reindex(before.index)]
     if len(clashes):
         place = " x ".join(map(str, clashes.index[0][:2]))
@@ -173,8 +173,8 @@ def compare(
         )
     lone_seeds = _find_lone_seeds(*of_metrics)
     networks = set(lone_seeds[1]["method"])
-    both = [frame[~(frame["seeded"] & frame["method"].isin(networks))] for frame in both]
-    of_means, count = _means(one, *_cap_noise(*both), basis=cells[0])
+    pair = [frame[~(frame["seeded"] & frame["method"].isin(networks))] for frame in pair]
+    of_means, count = _means(one, *_cap_noise(*pair), basis=cells[0])
     excesses = _replace_energies(one, *lone_seeds, basis=cells[0])
     earlier, later = _intersect([f[f["usable"]] for f in excesses], "scene", "method", "metric")
     of_one_seed = compare_scenes(earlier, later, _metrics(one))
@@ -214,8 +214,8 @@ def _headline(
             verdicts = {c.place: c.verdict for c in changes if (c.method, c.metric) == (method, metric)}
             scenes = " and ".join(sorted({f"{change} in a scene" for change in verdicts.values()}))
             note = verdicts.get(garment) or scenes or verdict
-            whole = before is not None and (after is not None or bool(verdicts))
-            cells.append(f"{number(before)} → {number(after)} {note}" if whole else DASH)
+            has_entry = before is not None and (after is not None or bool(verdicts))
+            cells.append(f"{number(before)} → {number(after)} {note}" if has_entry else DASH)
         if set(cells) != {DASH}:
             headline[method] = cells
     return headline
@@ -297,7 +297,7 @@ def _means(
     """
     rows = _select_common(*_replace_energies(run, one, other, basis=basis))
     first, second = (means(frame, *GROUP).to_dict() for frame in rows)
-    judged = {
+    earlier_means = {
         key: mean for key, mean in first.items()
         if key[-1] != WORST and (not mean.seeded or mean.seeds > 1)
     }  # fmt: skip
@@ -306,33 +306,32 @@ def _means(
         rows[0].groupby(["place", "metric"])["value"].agg(lambda values: values.abs().median()).to_dict()
     )
     candidates = [
-        (place, method, metric := metrics[name], mean, new, _effect(metric, new, mean))
-        for (place, method, name), mean in judged.items()
-        if mean.cells != (new := second[place, method, name]).cells
+        (place, method, metric := metrics[name], mean, new_mean, _effect(metric, new_mean, mean))
+        for (place, method, name), mean in earlier_means.items()
+        if mean.cells != (new_mean := second[place, method, name]).cells
     ]
     p_values = [shift.p_value() for *_, shift in candidates]
     corrected = iter(holm([p for p in p_values if p is not None]))
     changes = []
-    for (place, method, metric, mean, new, shift), raw_p in zip(candidates, p_values):
+    for (place, method, metric, mean, new_mean, shift), raw_p in zip(candidates, p_values):
         p = None if raw_p is None else next(corrected)
-        if is_negligible(metric, mean, new, shift, float(scales[place, metric.name])):
+        if is_negligible(metric, mean, new_mean, shift, float(scales[place, metric.name])):
             continue
         if metric.of == "machine" and mean.uncertainty is None and mean.seeds < 2:
             if shift.scale == RATIO and max(shift.shown, 1.0 / shift.shown) < ONCE:
                 continue
         elif not _exceeds_noise(metric, shift, p):
             continue
-        size = size_of(metric, mean, new, shift, p)
-        changes.append(
-            Change(side(metric, mean.value, new.value, shift.value), place, method, metric.name, size)
-        )
+        size = size_of(metric, mean, new_mean, shift, p)
+        verdict = side(metric, mean.value, new_mean.value, shift.value)
+        changes.append(Change(verdict, place, method, metric.name, size))
     reported = {(c.place, c.method, c.metric) for c in changes}
     pairs = rows[0][rows[0]["place"] != rows[0]["scene"]]
     garments = dict(zip(pairs["scene"], pairs["place"]))
     before, after = (frame[frame["scene"].isin(garments)] for frame in rows)
     of_scenes = compare_scenes(before, after, metrics)
     changes += [c for c in of_scenes if (garments[c.place], c.method, c.metric) not in reported]
-    return changes, len(judged)
+    return changes, len(earlier_means)
 
 
 def _replace_energies(run: Run, *frames: pd.DataFrame, basis: pd.DataFrame) -> list[pd.DataFrame]:
@@ -358,11 +357,11 @@ def _metrics(run: Run) -> dict[str, Metric]:
     return {**{m.name: m for m in relative}, **run.metrics}
 
 
-def _effect(metric: Metric, new: Mean, before: Mean) -> Effect:
+def _effect(metric: Metric, now: Mean, before: Mean) -> Effect:
     """Compute the effect of a change; of relative excess in points."""
     if metric.name.startswith("relative_excess/"):
-        return effect(new, before, DIFFERENCE, unit=100.0)
-    return effect(new, before, DIFFERENCE) if metric.arbitrary_zero else effect_of(metric, new, before)
+        return effect(now, before, DIFFERENCE, unit=100.0)
+    return effect(now, before, DIFFERENCE) if metric.arbitrary_zero else effect_of(metric, now, before)
 
 
 def _exceeds_noise(metric: Metric, shift: Effect, p: float | None) -> bool:

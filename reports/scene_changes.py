@@ -69,9 +69,9 @@ def side(metric: Metric, before: float, after: float, difference: float) -> str:
     return WORSE if abs(after - best) > abs(before - best) else BETTER
 
 
-def size_of(metric: Metric, mean: Mean, new: Mean, shift: Effect, p: float | None) -> str:
+def size_of(metric: Metric, mean: Mean, new_mean: Mean, shift: Effect, p: float | None) -> str:
     """Return a change as "0.21 ± 0.010 -> 0.26 ± 0.010 J, × 1.24 (1.20 to 1.28), p 0.0030"."""
-    before, after = (format_spread(m.value, m.spread_or_uncertainty) for m in (mean, new))
+    before, after = (format_spread(m.value, m.spread_or_uncertainty) for m in (mean, new_mean))
     sign = "×" if shift.scale == RATIO else "by"
     text = f"{before} -> {after}{_unit(metric)}, {sign} {number(shift.shown)}"
     if shift.interval:
@@ -83,12 +83,12 @@ def _unit(metric: Metric) -> str:
     return "" if metric.unit == "1" else f" {metric.unit}"
 
 
-def is_negligible(metric: Metric, mean: Mean, new: Mean, shift: Effect, scale: float) -> bool:
+def is_negligible(metric: Metric, mean: Mean, new_mean: Mean, shift: Effect, scale: float) -> bool:
     """Return whether a change of means is too small to be one.
 
     scale: the median method's value there; unit of a difference whose unit is unknown.
     """
-    if abs(new.value - mean.value) <= FLOOR * scale:
+    if abs(new_mean.value - mean.value) <= FLOOR * scale:
         return True
     share = tolerance_of(metric)
     limit = share * (shift.unit or scale) if shift.scale == DIFFERENCE else math.log1p(share)
@@ -147,23 +147,23 @@ def _differences(metric: Metric, rows: pd.DataFrame, spreads: float) -> pd.DataF
         """Return (2,scenes): mean over the seeds of either run."""
         return (np.bincount(cells, numbers) / counts).reshape(-1, 2).T
 
-    (old, new), (before, after) = means_of(values), means_of(scaled)
+    (old_means, new_means), (before, after) = means_of(values), means_of(scaled)
     draws = pd.factorize(rows["seed"] * 2 + run)[0]
     scatter, freedom = _scatter(scaled - np.stack([before, after])[run, places], places, draws)
-    median = float(np.median(np.abs(old)))
+    median = float(np.median(np.abs(old_means)))
     noise = spreads * np.hypot(*means_of(rows["uncertainty"].fillna(0.0).to_numpy()))
     share = tolerance_of(metric)
     if positive:
-        limit = np.maximum(math.log1p(share), np.log1p((FLOOR * median + noise) / old))
+        limit = np.maximum(math.log1p(share), np.log1p((FLOOR * median + noise) / old_means))
     else:
-        unit = 100.0 if relative else np.maximum(np.abs(old), median)
+        unit = 100.0 if relative else np.maximum(np.abs(old_means), median)
         limit = np.maximum(np.maximum(share * unit, FLOOR * median), noise)
     # On a scale of logarithms a fall by as much is farther than a rise.
-    limit = np.where(np.abs(new - old) <= noise, np.inf, limit)
+    limit = np.where(np.abs(new_means - old_means) <= noise, np.inf, limit)
     error = scatter * np.sqrt((1.0 / counts).reshape(-1, 2).sum(axis=1))
     return pd.DataFrame({
-        "scene": scenes, "method": rows["method"].iloc[0], "metric": metric.name, "before": old, "after": new,
-        "shift": after - before, "limit": limit, "error": error, "freedom": freedom,
+        "scene": scenes, "method": rows["method"].iloc[0], "metric": metric.name, "before": old_means,
+        "after": new_means, "shift": after - before, "limit": limit, "error": error, "freedom": freedom,
     })  # fmt: skip
 
 

@@ -206,9 +206,9 @@ def _reason_against(term: type[Energy]) -> str:
     """Say why a term cannot be part of a loss; empty if it can."""
     parameters = inspect.signature(term).parameters.values()
     variadic = (inspect.Parameter.VAR_POSITIONAL, inspect.Parameter.VAR_KEYWORD)
-    needed = [p.name for p in parameters if p.default is p.empty and p.kind not in variadic]
-    if needed != ["cloth"]:
-        return f"it is made of {', '.join(needed)}, a garment has its cloth alone"
+    arguments = [p.name for p in parameters if p.default is p.empty and p.kind not in variadic]
+    if arguments != ["cloth"]:
+        return f"it is made of {', '.join(arguments)}, a garment has its cloth alone"
     if term.prepare is not Energy.prepare:
         return "it must be prepared for each step of a simulation"
     return "its stencils change as vertices move" if term.dynamic else ""

@@ -108,9 +108,9 @@ def choose_motions(options: argparse.Namespace, simulated: Sequence[Motion] = ()
     motions = list(simulated) or [make_motion(name) for name in TRAIN]
     if options.motions:
         path, reading = parse_motion_files(options.motions)
-        read = load_motions(path, options=reading)
-        motions = [motion for motion in read if motion.name not in reading.clips("test")]
-        if absent := reading.absent([motion.name for motion in read]):
+        file_motions = load_motions(path, options=reading)
+        motions = [motion for motion in file_motions if motion.name not in reading.clips("test")]
+        if absent := reading.absent([motion.name for motion in file_motions]):
             print(absent, file=sys.stderr)
     return motions
 

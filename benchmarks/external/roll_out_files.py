@@ -237,10 +237,10 @@ def fit_to_scene(
             raise RollOutFileError(otherwise)
     positions = to_metres_y_up(stored.positions, units=units, up=up)
     _check_place(positions, expected_positions(scene), ordered=not other_mesh)
-    held = stored.quasi_static
+    solutions = stored.quasi_static
     return replace(
         stored, positions=positions,
-        quasi_static=None if held is None else to_metres_y_up(held, units=units, up=up),
+        quasi_static=None if solutions is None else to_metres_y_up(solutions, units=units, up=up),
     )  # fmt: skip
 
 

@@ -56,8 +56,8 @@ class Stored(Method):
 
     def quasi_static(self) -> Trajectory | None:
         """Return the quasi-static solutions of the file; None where it has none."""
-        held = None if self.stated.get("other_mesh") else self.stored.quasi_static
-        return None if held is None else self._trajectory(held)
+        solutions = None if self.stated.get("other_mesh") else self.stored.quasi_static
+        return None if solutions is None else self._trajectory(solutions)
 
     def _trajectory(self, positions: np.ndarray) -> Trajectory:
         stored, bad = self.stored, np.argwhere(~np.isfinite(positions).all(axis=-1))

@@ -161,10 +161,10 @@ def curvature_change(series: CurvatureSeries) -> float | None:
     A vertex's absolute deviations are least about its own median, so the quotient is at most 1.
     """
     h, area = series.curvature, series.area.mean(0)
-    whole = float(area.sum())
-    mean = float((h @ area).mean()) / whole if whole > 0.0 else 0.0
+    total_area = float(area.sum())
+    mean = float((h @ area).mean()) / total_area if total_area > 0.0 else 0.0
     spread = float((np.abs(h - mean) @ area).mean())
-    if spread <= FLAT * np.sqrt(whole):
+    if spread <= FLAT * np.sqrt(total_area):
         return None
     return float((np.abs(h - np.median(h, axis=0)) @ area).mean()) / spread
 

@@ -52,8 +52,8 @@ def root_mean_square(part: Array) -> float:
 
 def amplitude(part: Array, reference: Array) -> float:
     """Return the rms of D (T,H,3) over that of the reference's; nan where the reference has none."""
-    whole = root_mean_square(reference)
-    return root_mean_square(part) / whole if whole >= NO_MOTION else float("nan")
+    reference_rms = root_mean_square(reference)
+    return root_mean_square(part) / reference_rms if reference_rms >= NO_MOTION else float("nan")
 
 
 def correlation(part: Array, reference: Array) -> float:

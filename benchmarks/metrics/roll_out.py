@@ -28,14 +28,14 @@ LOST = 0.5  # [m] from the skinned shirt: a vertex so far off is on no body any 
 
 def measure_extrapolation(roll_out: RollOut) -> dict[str, float]:
     """Return the metrics of a scene that was made hard, each against the same method's ordinary walk."""
-    scene, x, whole = roll_out.scene, roll_out.positions, roll_out.trajectory.positions
+    scene, x, track = roll_out.scene, roll_out.positions, roll_out.trajectory.positions
     bare = scene.skinned
     if scene.dressed is None or bare is None:
         return {}
-    worst = float(strains(scene.cloth, whole).max())
+    worst = float(strains(scene.cloth, track).max())
     values = {
         "motion/strain": worst,
-        "motion/offset": geometry.MM * float(np.linalg.norm(whole - bare[: len(whole)], axis=2).max()),
+        "motion/offset": geometry.MM * float(np.linalg.norm(track - bare[: len(track)], axis=2).max()),
     }
     garment, ordinary = scene.dressed.garment, roll_out.counterpart
     if ordinary is not None:
@@ -45,7 +45,7 @@ def measure_extrapolation(roll_out: RollOut) -> dict[str, float]:
     if scene.cloth.material != garment.material and len(x) == scene.frames:
         values["motion/total"] = float(energies(roll_out)["total"][roll_out.judged].mean())
     if scene.glitch is not None and ordinary is not None:
-        gaps = geometry.distance_rms(whole, ordinary[: len(whole)])
+        gaps = geometry.distance_rms(track, ordinary[: len(track)])
         values |= {
             f"motion/recovery_{after}": geometry.MM * float(gaps[scene.glitch + after])
             for after in AFTER

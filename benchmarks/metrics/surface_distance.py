@@ -75,9 +75,9 @@ def _barycentric(points: Floats, corners: Floats) -> Floats:
     """Return the weights (N,3) [1] by which points (N,3) lie between the corners (N,3,3) of triangles."""
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normals, away = np.cross(first, second), points - corners[:, 0]
-    whole = np.maximum((normals**2).sum(axis=1), np.finfo(float).tiny)
-    u = (np.cross(away, second) * normals).sum(axis=1) / whole
-    v = (np.cross(first, away) * normals).sum(axis=1) / whole
+    squares = np.maximum((normals**2).sum(axis=1), np.finfo(float).tiny)
+    u = (np.cross(away, second) * normals).sum(axis=1) / squares
+    v = (np.cross(first, away) * normals).sum(axis=1) / squares
     return np.stack([1.0 - u - v, u, v], axis=1)
 
 

@@ -36,18 +36,18 @@ class ReadStudy:
     cases: tuple[Case, ...]
 
 
-def choose_cells(read: ReadStudy) -> tuple[tuple[Cell, ...], tuple[Case, ...]]:
+def choose_cells(scope: ReadStudy) -> tuple[tuple[Cell, ...], tuple[Case, ...]]:
     """Return the cells and cases that a study names: the product of its scenes and methods, part by part.
 
     Raises:
         StudyError: a word that names nothing, a choice of nothing, a roll-out that cannot take part.
     """
-    study = read.study
-    _check_words(read)
+    study = scope.study
+    _check_words(scope)
     chosen: dict[tuple[str, str, int], Cell] = {}
-    for name, scenes in scenes_of_parts(read).items():
-        methods = matching(read.methods, study.methods or study.parts[name].methods)
-        pairs = ((read.scenes[scene], read.methods[method]) for scene in scenes for method in methods)
+    for name, scenes in scenes_of_parts(scope).items():
+        methods = matching(scope.methods, study.methods or study.parts[name].methods)
+        pairs = ((scope.scenes[scene], scope.methods[method]) for scene in scenes for method in methods)
         for scene, entry in (pair for pair in pairs if pair[1].is_meant_for(pair[0])):
             one_seed = bool(matching([entry.name], study.one_seed))
             for seed in study.seeds[: 1 if one_seed else None] if entry.seeded else (0,):
@@ -55,20 +55,20 @@ def choose_cells(read: ReadStudy) -> tuple[tuple[Cell, ...], tuple[Case, ...]]:
                 before = chosen[key].suites if key in chosen else ()
                 chosen[key] = Cell(scene.at(study.sizes), entry, seed, (*before, name))
     chosen |= find_own_references(chosen)
-    cases = tuple(_cases(study, read.cases))
+    cases = tuple(_cases(study, scope.cases))
     if not (chosen or cases):
         raise StudyError(
             f"nothing to run: no such scene meets such a method in part{'s' * (len(study.parts) > 1)} "
             f"{', '.join(study.parts)} (some are for networks alone); see --list, or name another study"
         )
-    stored = roll_out_cells(study, tuple(chosen.values()), read.methods)
+    stored = roll_out_cells(study, tuple(chosen.values()), scope.methods)
     # The reference first: an error against it can be said as soon as another cell is done.
-    places = {name: place for place, name in enumerate(read.scenes)}
-    order = {name: place for place, name in enumerate((*read.methods, *study.rollouts))}
+    places = {name: place for place, name in enumerate(scope.scenes)}
+    order = {name: place for place, name in enumerate((*scope.methods, *study.rollouts))}
     unsorted = (*chosen.values(), *stored)
     ordered = sorted(unsorted, key=lambda c: (places[c.scene.name], order.get(c.method, 0), c.seed))
     cells = _time_once(ordered)
-    _check_user_scenes([cell.scene for cell in cells], read.motions)
+    _check_user_scenes([cell.scene for cell in cells], scope.motions)
     return tuple(cells), cases
 
 
@@ -99,22 +99,22 @@ def _means(name: str, patterns: Sequence[str]) -> bool:
     return name in patterns or any(fnmatchcase(name, pattern) for pattern in patterns)
 
 
-def scenes_of_parts(read: ReadStudy) -> dict[str, list[str]]:
+def scenes_of_parts(scope: ReadStudy) -> dict[str, list[str]]:
     """Return part -> names of its scenes.
 
     A scene that field `scenes` names and no part lists is met in the first part with a scene of its kind.
     """
-    scenes, patterns, parts = read.scenes, read.study.scenes, read.study.parts
-    usual = {name: matching(scenes, expand(part.scenes, read.motions)) for name, part in parts.items()}
+    scenes, patterns, parts = scope.scenes, scope.study.scenes, scope.study.parts
+    usual = {name: matching(scenes, expand(part.scenes, scope.motions)) for name, part in parts.items()}
     if not patterns:
         return usual
-    extras = {n: matching(scenes, expand(p.optional_scenes, read.motions)) for n, p in parts.items()}
+    extras = {n: matching(scenes, expand(p.optional_scenes, scope.motions)) for n, p in parts.items()}
     listed = {name for group in (usual, extras) for names in group.values() for name in names}
     chosen = {n: matching(dict.fromkeys((*usual[n], *extras[n])), patterns) for n in parts}
     strays = [p for p in patterns if p in scenes or p.startswith("!") or not matching(listed, [p])]
     for name in matching(scenes, strays) if set(strays) - listed else ():
         scene = scenes[name]
-        of_split = scene.dressed and scene.motion in read.motions.pick_motions(scene.garment)
+        of_split = scene.dressed and scene.motion in scope.motions.pick_motions(scene.garment)
         homes = [part for part in parts if scene.part in {scenes[n].part for n in usual[part]}]
         homes += list(parts) if name in patterns else []
         if name not in listed and homes and (name in patterns or of_split):
@@ -168,9 +168,9 @@ def _cases(study: Study, cases: Sequence[Case]) -> Iterator[Case]:
             yield case
 
 
-def _check_words(read: ReadStudy) -> None:
+def _check_words(scope: ReadStudy) -> None:
     """Raise StudyError for a word of a field that nothing has as its name."""
-    study, methods, cases = read.study, list(read.methods), [case.name for case in read.cases]
+    study, methods, cases = scope.study, list(scope.methods), [case.name for case in scope.cases]
 
     def check(field: str, choices: Sequence[str], names: Iterable[str]) -> None:
         for word in names:
@@ -180,13 +180,13 @@ def _check_words(read: ReadStudy) -> None:
                     hint = " (scenes of a dressed body are validation and test motions: see test_motions)"
                 raise StudyError(f"{field}: unknown {kind} '{word}'; {nearest(word, choices)}{hint}")
 
-    check("scenes", [*read.scenes, *cases], study.scenes)
+    check("scenes", [*scope.scenes, *cases], study.scenes)
     check("methods", methods, study.methods)
     check("one_seed", methods, study.one_seed)
     # Scenes that tailor a T-shirt themselves are none of a run with another garment.
-    scenes = list({**read.scenes, **all_scenes((), ())})
+    scenes = list({**scope.scenes, **all_scenes((), ())})
     for name, part in study.parts.items():
-        patterns = expand((*part.scenes, *part.optional_scenes), read.motions)
+        patterns = expand((*part.scenes, *part.optional_scenes), scope.motions)
         check(f"parts.{name}.scenes", scenes, patterns)
         check(f"parts.{name}.methods", methods, part.methods)
         check(f"parts.{name}.cases", [*cases, *SETS], part.cases)

@@ -108,9 +108,9 @@ def split_motions(study: Study, files: Collection[str] = ()) -> Motions:
     train = train or tuple(name for name in TRAIN if name not in held_out)
     split, sizes = study.split, study.sizes
     # Whoever names motions means all of them, whatever the sizes.
-    few = None if getattr(study, f"{split}_motions") else sizes.test_motions
+    limit = None if getattr(study, f"{split}_motions") else sizes.test_motions
     train = train[: sizes.train_motions]
-    motions = Motions(train, test, validation, tuple(files), split=split, few=few, dynamic=dynamic)
+    motions = Motions(train, test, validation, tuple(files), split=split, few=limit, dynamic=dynamic)
     if not motions.measured:
         raise StudyError(f"split: no motion has this role; name some by {split}_motions")
     return motions

@@ -162,19 +162,19 @@ def list_names(study: Study, word: str = "") -> str:
 
 def _sections(study: Study) -> dict[str, dict[str, str]]:
     """Return title -> name -> text of what can be named."""
-    read = read_files(study)
-    motions, parts = read.motions, study.parts
+    scope = read_files(study)
+    motions, parts = scope.motions, study.parts
     clip = f"{motions.garments[0].garment}/{motions.measured[0]}@clip"
     scenes = {
         scene.name: scene.description + (f" ({motions.role_of(scene.motion)})" if scene.dressed else "")
-        for scene in read.scenes.values()
+        for scene in scope.scenes.values()
         if not scene.name.endswith("@clip")
     }
     methods = {}
-    for name, entry in read.methods.items():
+    for name, entry in scope.methods.items():
         homes = ", ".join(part for part in parts if matching([name], parts[part].methods))
         methods[name] = f"{entry.description} [{homes or 'when named'}]"
-    listed = {part: ", ".join(names) for part, names in scenes_of_parts(read).items() if names}
+    listed = {part: ", ".join(names) for part, names in scenes_of_parts(scope).items() if names}
     return {
         "studies": {name: read_study(name).question for name in study_names()},
         "parts of this study": {name: part.question for name, part in parts.items()},
@@ -183,5 +183,5 @@ def _sections(study: Study) -> dict[str, dict[str, str]]:
         "methods, and the parts in which they take part without being named": methods,
         "training motions": dict.fromkeys(motions.train, ""),
         "sizes": {preset.name: preset.description for preset in PRESETS},
-        "known answers": {case.name: f"{case.description} [{case.suite}]" for case in read.cases},
+        "known answers": {case.name: f"{case.description} [{case.suite}]" for case in scope.cases},
     }

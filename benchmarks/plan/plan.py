@@ -120,14 +120,14 @@ class Plan:
 
     def open_assets(self) -> Assets:
         """Make body, garments and motions of the scenes. Raises ValueError where one cannot be made."""
-        read, train = self.inputs.motions, self.motions.train
+        user_motions, train = self.inputs.motions, self.motions.train
         names = [scene.motion for scene in self.scenes if scene.dressed]
         for garment in self.garments:
             names += self.motions.pick_motions(garment)
         names += train if self.networks else ()
         names = list(dict.fromkeys(names))
-        motions = [read[name] for name in names if name in read]
-        motions += make_motions(name for name in names if name not in read)
+        motions = [user_motions[name] for name in names if name in user_motions]
+        motions += make_motions(name for name in names if name not in user_motions)
         return open_assets(self.study.sizes, motions, self.garments, inputs=self.inputs, training=train)
 
 
@@ -213,15 +213,15 @@ def make_plan(
     workers = min(WORKERS, usable_cores()) if workers is None else workers
     if workers < 1:
         raise StudyError(f"--workers {workers}: give a whole number, 1 or more")
-    read = read_files(study, scenes)
-    cells, cases = choose_cells(read)
+    scope = read_files(study, scenes)
+    cells, cases = choose_cells(scope)
     return Plan(
         study=study,
         cells=cells,
         cases=cases,
         metrics=choose_metrics(study),
-        motions=read.motions,
-        inputs=read.inputs,
+        motions=scope.motions,
+        inputs=scope.inputs,
         folder=folder,
         workers=workers,
         scheduler=scheduler,

@@ -321,9 +321,9 @@ def _fields_of(path: Path, chain: tuple[Path, ...] = ()) -> Table:
 def _resolve(folder: Path, name: str, value: Any) -> Any:
     """Return the value of a field with its paths relative to where `folder` is."""
     if isinstance(value, Mapping):
-        return {name: _resolve(folder, name, held) for name, held in value.items()}
+        return {name: _resolve(folder, name, item) for name, item in value.items()}
     if isinstance(value, list):
-        return [_resolve(folder, name, held) for held in value]
+        return [_resolve(folder, name, item) for item in value]
     is_path = isinstance(value, str) and (name in PATHS or value.endswith(".py")) and value != LIBRARY
     return str(folder / value) if is_path else value
 
@@ -393,10 +393,10 @@ def _value_of(hint: Any, value: Any, field: tuple[str, ...]) -> Any:
         return value
     if origin is tuple:
         values = value if isinstance(value, list | tuple) else [value]
-        return tuple(_value_of(types[0], held, field) for held in values)
+        return tuple(_value_of(types[0], item, field) for item in values)
     if origin in (dict, Mapping):
-        held = _table(value, field)
-        return {name: _value_of(types[1], held[name], (*field, name)) for name in held}
+        table = _table(value, field)
+        return {name: _value_of(types[1], table[name], (*field, name)) for name in table}
     if is_dataclass(hint):
         return _dataclass_of(hint, value, field)
     if hint is float and type(value) is int:

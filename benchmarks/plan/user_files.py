@@ -51,7 +51,7 @@ def resolve(kind: Kind, names_and_paths: Sequence[str]) -> tuple[tuple[str, ...]
     """
     files = {w: entries_of(kind, file_of(w)) for w in names_and_paths if w.endswith(".py")}
     names = [[e.name for e in files[w]] if w in files else [w] for w in names_and_paths]
-    return tuple(name for some in names for name in some), [e for some in files.values() for e in some]
+    return tuple(name for group in names for name in group), [e for file in files.values() for e in file]
 
 
 def declarations_of(study: Study) -> tuple[Study, list[Scene], list[MethodEntry], list[Case]]:

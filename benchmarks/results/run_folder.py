@@ -100,9 +100,9 @@ class RunFolder:
     def find_changes(self, digests: Mapping[str, str]) -> dict[str, str]:
         """Return those of these files that are not as the run wrote them: name -> gone or damaged."""
         paths = {name: find_file(self.path / name) for name in digests}
-        gone = {name: "gone" for name, path in paths.items() if not path.is_file()}
-        present = {name: digest_of_file(path) for name, path in paths.items() if name not in gone}
-        return gone | {name: "damaged" for name, now in present.items() if now != digests[name]}
+        losses = {name: "gone" for name, path in paths.items() if not path.is_file()}
+        present = {name: digest_of_file(path) for name, path in paths.items() if name not in losses}
+        return losses | {name: "damaged" for name, now in present.items() if now != digests[name]}
 
     def write_rows(self, rows: Iterable[Row]) -> None:
         """Write results.csv whole or not at all."""

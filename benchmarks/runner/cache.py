@@ -44,8 +44,8 @@ class Cache:
             entry = read_json(path)
         if (entry.get("format"), entry.get("task")) != (FORMAT, task.title):
             return "missing: its entry is damaged or of another version", None
-        if lost := self.folder.find_changes(entry["files"]):
-            return "missing: " + ", ".join(f"{name} is {state}" for name, state in lost.items()), None
+        if losses := self.folder.find_changes(entry["files"]):
+            return "missing: " + ", ".join(f"{name} is {state}" for name, state in losses.items()), None
         now, before = dependencies(task, others), entry["parts"]
         if changes := [name for name in now | before if now.get(name) != before.get(name)]:
             return "stale: " + ", ".join(changes[:3]) + (", ..." if len(changes) > 3 else ""), None
@@ -90,8 +90,8 @@ _KEPT = ("status", "reason", "failed", "result", "seconds")
 def dependencies(task: Task, others: Mapping[TaskId, Outcome]) -> dict[str, str]:
     """Return name -> digest or version of each input, folder of code, package and task that a task reads."""
     inputs = {name: digest(value) for name, value in task.inputs.items()}
-    read = {" ".join(id): others.get(id, Outcome()).content for id in (*task.needs, *task.reads)}
-    return inputs | software(*task.code) | read
+    contents = {" ".join(id): others.get(id, Outcome()).content for id in (*task.needs, *task.reads)}
+    return inputs | software(*task.code) | contents
 
 
 def _content(entry: Mapping[str, Any]) -> str:

@@ -64,7 +64,7 @@ def times(cell: Cell, reading: Reading, frames: list[np.ndarray]) -> dict[str, f
     return result
 
 
-def run_cell(cell: Cell, min_time: float, context: Context, needed: Needed) -> Outcome:
+def run_cell(cell: Cell, min_time: float, context: Context, outcomes: Needed) -> Outcome:
     """Return the outcome of a cell: its trajectory, timed for `min_time` [s], and the time of its inputs."""
     try:
         return compute_cell(cell, min_time, context)
@@ -126,7 +126,7 @@ def compute_cell(cell: Cell, min_time: float, context: Context) -> Outcome:
     return Outcome(status, reason, result=result, files=tuple(map(folder.relative, paths)))
 
 
-def time_batch(cell: Cell, min_time: float, context: Context, needed: Needed) -> Outcome:
+def time_batch(cell: Cell, min_time: float, context: Context, outcomes: Needed) -> Outcome:
     """Return the time of many bodies at once, by the method that this process has run."""
     method = context.memo.get("method") or prepare_method(cell, context)
     positions, reading = time_run(
@@ -139,9 +139,9 @@ def time_batch(cell: Cell, min_time: float, context: Context, needed: Needed) ->
     return Outcome(result=result)
 
 
-def repeat_cell(longest: float, cell: Cell, min_time: float, context: Context, needed: Needed) -> Outcome:
-    """Return the time of one more run of a cell, whose first did not take longer than `longest` [s]."""
-    if needed[cell.id()].result["seconds"] > longest:
+def repeat_cell(limit: float, cell: Cell, min_time: float, context: Context, outcomes: Needed) -> Outcome:
+    """Return the time of one more run of a cell, whose first did not take longer than `limit` [s]."""
+    if outcomes[cell.id()].result["seconds"] > limit:
         return Outcome("skipped", "the first run took too long")
     _, reading, frames = clock(prepare_method(cell, context), min_time)
     if reading.complaint:
@@ -225,7 +225,7 @@ def misshapen(positions: np.ndarray, scene: BuiltScene, *, other_mesh: bool = Fa
     return f"gives positions {x.dtype} {x.shape}: floats {shape} are due, the start included"
 
 
-def run_case(case: Case, context: Context, needed: Needed) -> Outcome:
+def run_case(case: Case, context: Context, outcomes: Needed) -> Outcome:
     """Return the outcome of a case; its row is the result."""
     row = case.run()
     return Outcome(row.status, row.reason, failed=row.status != "ok", result=dataclasses.asdict(row))

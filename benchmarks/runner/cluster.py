@@ -80,19 +80,19 @@ class Cluster:
                 return max(1, sum(self.client.nthreads().values()))
         return 1
 
-    def do(self, tasks: Sequence[Task], needed: Needed) -> Iterator[Outcome]:
+    def do(self, tasks: Sequence[Task], outcomes: Needed) -> Iterator[Outcome]:
         """Yield the outcomes of a batch, done by one process where its worker lives.
 
         Raises RunStopped where the cluster is gone or cannot do it.
         """
         worker = ""
         for task in tasks:
-            outcome, worker = self._outcome(task, needed, worker)
+            outcome, worker = self._outcome(task, outcomes, worker)
             yield outcome
 
-    def _outcome(self, task: Task, needed: Needed, address: str) -> tuple[Outcome, str]:
+    def _outcome(self, task: Task, outcomes: Needed, address: str) -> tuple[Outcome, str]:
         """Return the outcome of a task and the address of its worker. address: of the preferred one."""
-        work = pickle.dumps((task, needed, software_of(task)))
+        work = pickle.dumps((task, outcomes, software_of(task)))
         while True:
             try:
                 future = self.client.submit(
@@ -104,8 +104,8 @@ class Cluster:
                 raise
             except Exception as error:
                 if self.client.status == "closed":
-                    lost = f"the scheduler {self.address} is gone and was not back in {PATIENCE:g} s"
-                    raise RunStopped(lost) from None
+                    fault = f"the scheduler {self.address} is gone and was not back in {PATIENCE:g} s"
+                    raise RunStopped(fault) from None
                 if isinstance(error, CancelledError):  # the scheduler died: another one is asked
                     continue
                 if type(error).__name__ != "KilledWorker":
@@ -158,13 +158,13 @@ def do_task(assets: Path, work: bytes) -> tuple[Outcome, str]:
     if not assets.is_file():
         unseen = f"worker {worker.address}: it does not see the run's folder {assets.parent}"
         raise RunStopped(f"{unseen}: by --out give one that all machines see")
-    task, needed, software = pickle.loads(work)
+    task, outcomes, software = pickle.loads(work)
     if changed := sorted(name for name, _ in software.items() ^ software_of(task).items()):
         other = f"its software is another ({changed[0]}); install the same there as here"
         raise RunStopped(f"worker {worker.address}: {other}")
     process = _process_of(assets)
     with ThreadPoolExecutor(1) as thread:
-        future = thread.submit(process.do, task, needed)
+        future = thread.submit(process.do, task, outcomes)
         while not wait([future], WATCH).done:
             state = worker.state.tasks.get(key)
             if state is None or state.state == "cancelled":  # by the command, or as it died

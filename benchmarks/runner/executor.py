@@ -35,7 +35,7 @@ class LocalProcesses:
         self._all: list[TaskProcess] = []
         self._idle: list[TaskProcess] = []
 
-    def do(self, tasks: Sequence[Task], needed: Needed) -> Iterator[Outcome]:
+    def do(self, tasks: Sequence[Task], outcomes: Needed) -> Iterator[Outcome]:
         """Yield the outcomes of a batch, done by one process; called by several threads."""
         try:
             process = self._idle.pop()
@@ -43,7 +43,7 @@ class LocalProcesses:
             process = TaskProcess(*self._known)
             self._all.append(process)
         for task in tasks:
-            yield process.do(task, needed)
+            yield process.do(task, outcomes)
         self._idle.append(process)
 
     def stop(self) -> None:
@@ -81,8 +81,8 @@ class Executor:
         finished: queue.SimpleQueue[Done] = queue.SimpleQueue()
         stopped = threading.Event()
 
-        def do(tasks: Sequence[Task], needed: Needed) -> None:
-            for outcome, task in zip(self.back_end.do(tasks, needed), tasks):
+        def do(tasks: Sequence[Task], outcomes: Needed) -> None:
+            for outcome, task in zip(self.back_end.do(tasks, outcomes), tasks):
                 if stopped.is_set():  # the process was killed at it
                     return
                 finished.put((task, outcome))
@@ -114,12 +114,12 @@ class Executor:
             finally:
                 self.back_end.rest()
 
-    def run_alone(self, task: Task, needed: Needed) -> Outcome:
+    def run_alone(self, task: Task, outcomes: Needed) -> Outcome:
         """Return the outcome of a timed task, done in the process that it names, with nothing beside it."""
         if task.process not in self._named:
             assets = self.assets.only(task.motion) if self.assets and task.motion else None
             self._named[task.process] = TaskProcess(self.folder, assets)
-        return self._named[task.process].do(task, needed)
+        return self._named[task.process].do(task, outcomes)
 
     def release(self, process: str) -> None:
         """End the process of this name, which no other task wants."""

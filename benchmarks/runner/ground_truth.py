@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 GRID = 2.0**13
 
 
-def settle_start(scene: Scene, context: Context, needed: Needed) -> Outcome:
+def settle_start(scene: Scene, context: Context, outcomes: Needed) -> Outcome:
     """Write the garment settled in the first pose of a scene, and the posed body.
 
     Where a scene has `start_of`, its start is what settled in that scene.
@@ -52,7 +52,7 @@ def files_of_start(scene: Scene, run: RunFolder) -> tuple[str, ...]:
     return tuple(map(run.relative, paths))
 
 
-def simulate_motion(scene: Scene, entry: MethodEntry, context: Context, needed: Needed) -> Outcome:
+def simulate_motion(scene: Scene, entry: MethodEntry, context: Context, outcomes: Needed) -> Outcome:
     """Write the simulation of a training motion by a method, settling included; a whole one teaches."""
     built, run = scene.build(context.assets), context.folder
     trajectory = simulate_scene(built, entry, run)
@@ -75,7 +75,7 @@ def simulate_clips(
     motions: tuple[str, ...],
     part: int,
     context: Context,
-    needed: Needed,
+    outcomes: Needed,
 ) -> Outcome:
     """Write the vertices of those clips whose simulation, settled like a motion's, is whole and converged.
 
@@ -136,7 +136,7 @@ def simulate_scene(scene: BuiltScene, entry: MethodEntry, folder: RunFolder) -> 
     return method.run()
 
 
-def simulate_quasi_static(scene: Scene, context: Context, needed: Needed) -> Outcome:
+def simulate_quasi_static(scene: Scene, context: Context, outcomes: Needed) -> Outcome:
     """Write the quasi-static solution of each frame of a scene: dynamics are measured against it."""
     import numpy as np
 

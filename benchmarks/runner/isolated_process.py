@@ -67,7 +67,7 @@ class TaskProcess:
         self._context: Any = start_loading()
         self._process: Any = None
 
-    def do(self, task: Task, needed: Needed) -> Outcome:
+    def do(self, task: Task, outcomes: Needed) -> Outcome:
         """Return the task's outcome, however it ends; what it leaves in the memo is there for its batch.
 
         Raises RunStopped.
@@ -76,7 +76,7 @@ class TaskProcess:
         try:
             outcome = self._call(warm_up, task.warm_up, seconds=COMPILING) if task.warm_up else Outcome()
             if not outcome.failed:
-                outcome = self._call(perform, task.batch_id, task.run, needed, seconds=task.deadline)
+                outcome = self._call(perform, task.batch_id, task.run, outcomes, seconds=task.deadline)
         except Exception as error:
             outcome = failure(error)
         # of a program, ended by its method: what it has started may run on
@@ -193,14 +193,14 @@ def lead_a_group() -> None:
 
 
 def perform(
-    context: Context, batch: TaskId, run: Callable[[Context, Needed], Outcome], needed: Needed
+    context: Context, batch: TaskId, run: Callable[[Context, Needed], Outcome], outcomes: Needed
 ) -> Outcome:
     """Return the outcome of a task of a batch, with its time."""
     if context.memo and context.batch != batch:
         context.memo.clear()
         gc.collect()  # a simulation refers to itself
     context.batch, clock = batch, time.perf_counter()
-    outcome = run(context, needed)
+    outcome = run(context, outcomes)
     return replace(outcome, seconds=time.perf_counter() - clock)
 
 

@@ -94,18 +94,18 @@ class Runner:
 
     def _find(self, task: Task) -> tuple[str, Outcome | None]:
         """Return why a task has to run, or how it failed; and its outcome where that is known."""
-        needed = self._find_needs(task)
+        outcomes = self._find_needs(task)
         if task.skip:
             return task.skip, Outcome("skipped", task.skip)
         for id in task.needs:
-            if id not in needed:
+            if id not in outcomes:
                 outcome = self._refuse(id)
                 return outcome.reason, outcome
         return self.cache.find(task, self.outcomes)
 
-    def _refuse(self, missing: TaskId) -> Outcome:
+    def _refuse(self, need: TaskId) -> Outcome:
         """Return the outcome of a task that lacks a need; nothing of it is kept."""
-        title, other = self.titles.get(missing, " ".join(missing)), self.outcomes.get(missing, Outcome())
+        title, other = self.titles.get(need, " ".join(need)), self.outcomes.get(need, Outcome())
         if other.status == "skipped":
             return Outcome("skipped", f"{title}: {other.reason}")
         return Outcome("failed", f"cannot be run: {title}: {other.ending}", failed=True)

@@ -24,7 +24,7 @@ from reference_sim.files.atomic_files import replacing
 
 def measure_cell(
     cell: Cell, cells: tuple[Cell, ...], gap_samples: int, outside: tuple[str, ...], context: Context,
-    needed: Needed,
+    outcomes: Needed,
 ) -> Outcome:  # fmt: skip
     """Measure the trajectory, and write energies of each frame and other curves beside it.
 
@@ -34,14 +34,14 @@ def measure_cell(
         gap_samples: frames in which the energy gap is measured.
         outside: files of metrics not the project's, measured in every scene.
         context: the roll-outs of a batch share search trees, and the energies of references.
-        needed: outcomes of the cells, of the quasi-static solution, and of the method in another scene.
+        outcomes: of the cells, of the quasi-static solution, and of the method in another scene.
     """
     if "roll-outs" not in context.memo:
-        context.memo["roll-outs"] = roll_outs_of(cells, gap_samples, context, needed)
+        context.memo["roll-outs"] = roll_outs_of(cells, gap_samples, context, outcomes)
     roll_out, folder = context.memo["roll-outs"][cell], context.folder
     if cell.scene.counterpart:
         other = replace(cell, scene=replace(cell.scene, name=cell.scene.counterpart))
-        if needed.get(other.id(), Outcome("skipped")).status in USABLE:
+        if outcomes.get(other.id(), Outcome("skipped")).status in USABLE:
             roll_out.counterpart = _positions(folder.trajectory_path(*other.key))
     metrics, curves, (status, reason) = measure_roll_out(roll_out, cell.scene.metrics, outside)
     path = folder.curves_path(*cell.key)
@@ -61,18 +61,18 @@ def measure_cell(
 
 
 def roll_outs_of(
-    cells: tuple[Cell, ...], gap_samples: int, context: Context, needed: Needed
+    cells: tuple[Cell, ...], gap_samples: int, context: Context, outcomes: Needed
 ) -> dict[Cell, RollOut]:
     """Return the roll-outs of a scene's cells."""
     from reference_sim import Trajectory
 
     folder, scene = context.folder, cells[0].scene
     group = SceneRollOuts(build_scene(scene, context), gap_samples=gap_samples)
-    if id_of("quasi-static", scene) in needed:
+    if id_of("quasi-static", scene) in outcomes:
         group.quasi_static = _positions(folder.quasi_static_path(scene.name))
     roll_outs = {}
     for cell in cells:
-        outcome = needed.get(cell.id())
+        outcome = outcomes.get(cell.id())
         if outcome is not None and outcome.files:
             roll_outs[cell] = RollOut(
                 group, cell.entry, Trajectory.load(folder.trajectory_path(*cell.key)),

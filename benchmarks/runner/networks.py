@@ -73,7 +73,7 @@ class NetworkTraining:
         return () if self.training.packaged else (folder.relative(self.path(folder)),)
 
 
-def train(job: NetworkTraining, context: Context, needed: Needed) -> Outcome:
+def train(job: NetworkTraining, context: Context, outcomes: Needed) -> Outcome:
     """Train the network and write its model."""
     import torch
 
@@ -93,10 +93,10 @@ def train(job: NetworkTraining, context: Context, needed: Needed) -> Outcome:
     motions, targets = job.motions, None
     mixed: list[Motion] = []
     if job.reads:
-        whole = {o.result["motion"]: o for o in needed.values() if o.result.get("whole")}
-        motions = tuple(motion for motion in job.motions if motion in whole)
-        targets = {m: Trajectory.load(run.path / o.files[0]).positions for m, o in whole.items()}
-        mixed, simulated = mix_clips(job, assets, run, needed)
+        simulations = {o.result["motion"]: o for o in outcomes.values() if o.result.get("whole")}
+        motions = tuple(motion for motion in job.motions if motion in simulations)
+        targets = {m: Trajectory.load(run.path / o.files[0]).positions for m, o in simulations.items()}
+        mixed, simulated = mix_clips(job, assets, run, outcomes)
         targets |= simulated
     checkpoint = Checkpoint(
         path=path.with_name(f".{path.stem}.checkpoint.safetensors"), minutes=CHECKPOINT_MINUTES,
@@ -107,7 +107,7 @@ def train(job: NetworkTraining, context: Context, needed: Needed) -> Outcome:
         trajectories=targets, recipe=training.recipe, progress=False, every=EVERY, device=job.device,
         checkpoint=checkpoint,
     )  # fmt: skip
-    model.origin = origin_of(job, needed, left_out=[name for name in job.motions if name not in motions])
+    model.origin = origin_of(job, outcomes, left_out=[m for m in job.motions if m not in motions])
     outcome = _outcome(model, job, run, {})
     checkpoint.delete()
     return outcome
@@ -134,7 +134,7 @@ def _outcome(model: TrainedModel, job: NetworkTraining, run: RunFolder, facts: d
     return Outcome(result=result | facts, files=files, origin=origin)
 
 
-def origin_of(job: NetworkTraining, needed: Needed, *, left_out: list[str]) -> dict[str, Any]:
+def origin_of(job: NetworkTraining, outcomes: Needed, *, left_out: list[str]) -> dict[str, Any]:
     """Return what the file of the model says of its training; left_out: motions without simulation."""
     simulated = job.training.simulated
     return {
@@ -143,8 +143,8 @@ def origin_of(job: NetworkTraining, needed: Needed, *, left_out: list[str]) -> d
         "motions": [name for name in job.motions if name not in left_out],
         "simulated_by": simulated.method if simulated else "",
         "left_out": left_out,
-        "clips_left_out": sum(len(outcome.result.get("left_out", ())) for outcome in needed.values()),
-        "data_seconds": sum(outcome.seconds for outcome in needed.values()),
+        "clips_left_out": sum(len(outcome.result.get("left_out", ())) for outcome in outcomes.values()),
+        "data_seconds": sum(outcome.seconds for outcome in outcomes.values()),
         "commit": provenance.commit(),
         "hardware": provenance.hardware(job.device),
         "versions": provenance.versions(),
@@ -154,7 +154,7 @@ def origin_of(job: NetworkTraining, needed: Needed, *, left_out: list[str]) -> d
 
 
 def mix_clips(
-    job: NetworkTraining, assets: Assets, folder: RunFolder, needed: Needed
+    job: NetworkTraining, assets: Assets, folder: RunFolder, outcomes: Needed
 ) -> tuple[list[Motion], dict[str, np.ndarray]]:
     """Return the simulated augmented clips, and their vertices (T,V,3) [m] by name."""
     from reference_sim.files.array_file import read_arrays
@@ -162,7 +162,7 @@ def mix_clips(
 
     vertices_of: dict[str, np.ndarray] = {}
     parts = [id for id in job.reads if id[0] == "clips"]
-    for outcome in (needed[id] for id in parts if id in needed):
+    for outcome in (outcomes[id] for id in parts if id in outcomes):
         vertices_of |= read_arrays(folder.path / outcome.files[0])
     if twice := sorted(vertices_of.keys() & set(job.motions)):
         raise ValueError(f"training motion {twice[0]!r}: a mixed clip is called so: rename its file")
@@ -197,7 +197,7 @@ def find_pretrained(job: NetworkTraining, folder: Path) -> tuple[Path | None, st
     return path, f"{path}: a network of another training ({', '.join(others)}): {MAKE}" if others else ""
 
 
-def take(job: NetworkTraining, source: Path, context: Context, needed: Needed) -> Outcome:
+def take(job: NetworkTraining, source: Path, context: Context, outcomes: Needed) -> Outcome:
     """Copy a network, once it is known to be whole; one of the package is read from there."""
     from snug.networks.trained_model import TrainedModel
 

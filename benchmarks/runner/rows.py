@@ -43,9 +43,9 @@ def rows_of_cell(
         return
     measured = outcomes.get(cell.id("metrics"))
     network, taught_by = Outcome(), list[Outcome]()
-    if (needed := network_of(cell)) and needed.task_id in tasks:
-        network = outcomes.get(needed.task_id, network)
-        taught_by = [outcomes[id] for id in tasks[needed.task_id].reads if id in outcomes]
+    if (model := network_of(cell)) and model.task_id in tasks:
+        network = outcomes.get(model.task_id, network)
+        taught_by = [outcomes[id] for id in tasks[model.task_id].reads if id in outcomes]
     metrics: dict[str, Any] = {}  # a number, or the parts of an Estimate
     status, reason = outcome.status, outcome.reason
     if outcome.files:

@@ -110,8 +110,8 @@ class RunLog:
         self.folder.write_rows(self.rows)
         run_folder.write_frame_energies(self.folder, self.rows)
         self.config |= describe_plan(self.plan, self.rows)
-        written = (self.folder.rows_path, self.folder.frame_energies_path)
-        self.config["digests"] = {path.name: digest_of_file(path) for path in written if path.is_file()}
+        paths = (self.folder.rows_path, self.folder.frame_energies_path)
+        self.config["digests"] = {path.name: digest_of_file(path) for path in paths if path.is_file()}
         self.folder.write_config(self.config)
 
     def count_look(self) -> None:

@@ -145,8 +145,8 @@ def drape(cloth: Cloth, energies: tuple[Energy, ...], dressed: Dressed, frames: 
     start = garment.rest_for(body, betas) @ root[:, :3].T + root[:, 3]
     way = replace(dressed, motion=replace(motion, poses=poses, translations=translations))
     x = _simulate(cloth, energies, way, start, "come to rest in the first pose")[-1]
-    whole = replace(garment, pins=np.arange(len(x)))
-    carried = whole.pin_positions(body, first[None], translations[:1], betas)[0]
+    pinned_garment = replace(garment, pins=np.arange(len(x)))
+    carried = pinned_garment.pin_positions(body, first[None], translations[:1], betas)[0]
     off = np.linalg.norm(x - carried, axis=1)
     pieces = piece_of_faces(cloth.faces)
     gap = max(off[cloth.faces[pieces == piece]].min() for piece in range(pieces.max() + 1))

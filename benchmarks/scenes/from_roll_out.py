@@ -30,10 +30,10 @@ def declare_scene(option: RollOutOption, rest_mesh: str) -> Scene:
     """Declare the scene of a roll-out. Raises RollOutFileError for an unreadable file or half a body."""
     stored = read_roll_out(option.path)
     halves = {"obstacle": stored.obstacle, "obstacle_faces": stored.obstacle_faces}
-    gone = [name for name, half in halves.items() if half is None]
-    if len(gone) == 1:
+    gaps = [name for name, half in halves.items() if half is None]
+    if len(gaps) == 1:
         raise RollOutFileError(
-            f"{option.path}: holds half a body: {gone[0]} is absent; give obstacle (T,B,3) and "
+            f"{option.path}: holds half a body: {gaps[0]} is absent; give obstacle (T,B,3) and "
             "obstacle_faces (G,3), or neither"
         )
     return Scene(
@@ -44,7 +44,7 @@ def declare_scene(option: RollOutOption, rest_mesh: str) -> Scene:
             "path": option.path, "rest_mesh": rest_mesh, "units": option.units, "up": option.up,
             "fps": option.fps, "digests": (digest(stored), digest(read_mesh(rest_mesh))),
         },
-        obstacle=not gone,
+        obstacle=not gaps,
     )  # fmt: skip
 
 

@@ -51,9 +51,9 @@ def check_result(potential: sim.Potential, guess: np.ndarray, result: sim.Result
         return measure(reason=f"the energy rose from {before:.17g} to {after:.17g} J")
     if status != "ok":
         areas = corner_areas(x[potential.cloth.faces])
-        lost = int((areas < COLLAPSED * potential.cloth.areas).sum())
-        collapse = f"; {lost} triangles collapsed, where a hinge's energy jumps: no minimum need exist"
-        reason = f"{result.reason} ({result.iterations} iterations){collapse if lost else ''}"
+        count = int((areas < COLLAPSED * potential.cloth.areas).sum())
+        collapse = f"; {count} triangles collapsed, where a hinge's energy jumps: no minimum need exist"
+        reason = f"{result.reason} ({result.iterations} iterations){collapse if count else ''}"
         return measure(status=status, reason=reason)
     if optimum.residual > max(RELATIVE_RESIDUAL, optimum.round_off):
         return measure(reason=f"claims convergence at a relative residual of {optimum.residual:.3g}")

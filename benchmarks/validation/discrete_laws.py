@@ -114,9 +114,9 @@ def angular_momentum_balance() -> float:
     m = cloth.masses
     v = np.diff(x, axis=0) / DT
     L = np.einsum("v,tvi->ti", m, np.cross(x[1:], v))
-    lost = np.einsum("v,tvi->ti", m, np.cross(v[:-1], v[1:]))
+    momentum_loss = np.einsum("v,tvi->ti", m, np.cross(v[:-1], v[1:]))
     torque = np.cross(x[2:], [0.0, -1.0, 0.0]) * energies.Gravity(cloth).weights[:, None]
-    errors = np.diff(L, axis=0) + DT * lost - DT * torque.sum(axis=1)
+    errors = np.diff(L, axis=0) + DT * momentum_loss - DT * torque.sum(axis=1)
     return float(np.abs(errors).max() / np.abs(L).max())
 
 
@@ -166,6 +166,6 @@ def energy_inequality() -> float:
     v = np.concatenate([np.zeros_like(x[:1]), np.diff(x, axis=0) / scene.dt])
     kinetic = 0.5 * np.einsum("v,tvi,tvi->t", masses, v, v)
     change = np.diff(v, axis=0)
-    lost = 0.5 * np.einsum("v,tvi,tvi->t", masses, change, change)
-    rise = phi[1:] + lost - phi[:-1] - kinetic[:-1]
+    energy_loss = 0.5 * np.einsum("v,tvi,tvi->t", masses, change, change)
+    rise = phi[1:] + energy_loss - phi[:-1] - kinetic[:-1]
     return float(np.maximum(rise, 0.0).max() / kinetic.max())

@@ -54,8 +54,8 @@ def bent_strip(
     if load:
         forces = np.zeros_like(cloth.rest_positions)
         areas = cloth.vertex_areas[strip.tip]
-        whole = load * strip.stiffness / length**2 * strip.width
-        forces[strip.tip, 1] = -whole * (areas / areas.sum())
+        total_force = load * strip.stiffness / length**2 * strip.width
+        forces[strip.tip, 1] = -total_force * (areas / areas.sum())
         terms.append(DeadLoad(cloth, forces))
     s, (x, drop) = exact_elastica(weight, load)
     rest = cloth.rest_positions

@@ -55,8 +55,8 @@ def new_folder(folder: Path) -> Iterator[Path]:
     Raises ValueError where something exists under that name, or no folder can be made.
     """
     demand_new(folder)
-    whole = folder.resolve()
-    part = whole.with_name(f".{whole.name}.{os.getpid()}.part")
+    target = folder.resolve()
+    part = target.with_name(f".{target.name}.{os.getpid()}.part")
     try:
         part.mkdir(parents=True)
     except OSError as error:
@@ -65,9 +65,9 @@ def new_folder(folder: Path) -> Iterator[Path]:
         raise ValueError(f"{folder}: cannot be made ({error.strerror}); name another folder") from None
     try:
         yield part
-        if whole.is_dir():  # and empty; not every system replaces it
-            whole.rmdir()
-        part.replace(whole)
+        if target.is_dir():  # and empty; not every system replaces it
+            target.rmdir()
+        part.replace(target)
     finally:
         shutil.rmtree(part, ignore_errors=True)
 

@@ -130,8 +130,8 @@ def _paths(pattern: str) -> list[Path]:
         paths = [Path(name) for name in glob.glob(pattern)]
     kinds = sorted({p.suffix.lower() for p in paths})
     if len(kinds) != 1:
-        held = f"meshes of several kinds ({', '.join(kinds)})" if kinds else "no mesh"
-        raise MeshError(f"{pattern}: {held}: quote a pattern of one kind, as 'body_*.ply'")
+        content = f"meshes of several kinds ({', '.join(kinds)})" if kinds else "no mesh"
+        raise MeshError(f"{pattern}: {content}: quote a pattern of one kind, as 'body_*.ply'")
     return _sort(paths)
 
 

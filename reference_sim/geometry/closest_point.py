@@ -53,8 +53,8 @@ def list_leaves(low, high, leaf_low, leaf_high, limit, masks):
 
 
 @njit(cache=True, error_model="numpy")
-def search(some, points, samples, exact, mesh, pose, faces, barycentric, closest, missed):
-    """Find the closest allowed faces of some samples (n,), LANES by LANES, from the hints in faces (S,) on.
+def search(subset, points, samples, exact, mesh, pose, faces, barycentric, closest, missed):
+    """Find the closest allowed faces of a subset (n,), LANES by LANES, from the hints in faces (S,) on.
 
     Writes who found none into missed (S,) and returns how many.
     """
@@ -73,11 +73,11 @@ def search(some, points, samples, exact, mesh, pose, faces, barycentric, closest
     out = np.empty(LANES * LANES, np.float32)
     leaves, bounds = np.empty(LANES * len(boxes), np.int64), np.empty(LANES * len(boxes), np.float32)
     limited, misses = limit < np.inf, 0
-    for first in range(0, len(some), LANES):
-        count, worst = min(LANES, len(some) - first), np.float32(0.0)
+    for first in range(0, len(subset), LANES):
+        count, worst = min(LANES, len(subset) - first), np.float32(0.0)
         for g in range(LANES):  # an incomplete group is filled up with its first member
             at = first + (g if g < count else 0)
-            s = some[at]
+            s = subset[at]
             for c in range(3):
                 x[g, c] = points[s, c]
                 x32[c, g] = x[g, c] - origin[c]
@@ -133,7 +133,7 @@ def search(some, points, samples, exact, mesh, pose, faces, barycentric, closest
                 for g in range(count):
                     worst = max(worst, useful[g])
         for g in range(count):
-            s, k = some[first + g], answer[g]
+            s, k = subset[first + g], answer[g]
             if k < 0:
                 missed[misses] = s
                 misses += 1
@@ -232,10 +232,10 @@ class FaceSearch:
             np.zeros((leaves, QUANTITIES * LANES), np.float32), np.zeros(1),
         )  # fmt: skip
         self._pose = Pose(0, np.empty((0, 3)), np.zeros(3))
-        everywhere, none, masks = np.arange(leaves), np.zeros((1, 3)), np.full(blocks, 2**LANES - 1)
+        everywhere, rest, masks = np.arange(leaves), np.zeros((1, 3)), np.full(blocks, 2**LANES - 1)
         masks[-1] >>= LANES * blocks - leaves
         self._everywhere = Listed(
-            place, np.zeros(1, np.int64), np.full(1, blocks), np.arange(blocks), masks, everywhere, none,
+            place, np.zeros(1, np.int64), np.full(1, blocks), np.arange(blocks), masks, everywhere, rest,
             np.inf,
         )  # fmt: skip
 
@@ -253,10 +253,10 @@ class FaceSearch:
         here; where there is none, all.
         """
         points = np.ascontiguousarray(points, np.float64)
-        order, whole = arrange(points), self._everywhere
+        order, full_list = arrange(points), self._everywhere
         if region == np.inf:
-            return whole._replace(order=order)
-        count, blocks = -(-len(points) // LANES), len(whole.blocks)
+            return full_list._replace(order=order)
+        count, blocks = -(-len(points) // LANES), len(full_list.blocks)
         masks = np.zeros((count, blocks), np.int64)
         list_leaves(*_boxes(points[order]), *_boxes(self._mesh.centroids), region * region, masks)
         # Without strides, as in the list of all: numba compiles the search once.
@@ -290,11 +290,11 @@ class FaceSearch:
             samples = self.group(points)
         missed, mesh = np.empty(len(points), np.int64), self._mesh
         state = float(exact), mesh, self._pose, faces, barycentric, closest, missed
-        lost = missed[: search(samples.order, points, samples, *state)].copy()
-        if len(lost):  # whoever asks for NaN gets the first face
-            faces[lost], barycentric[lost] = mesh.order[0], 1.0 / 3.0
-            closest[lost] = self._pose.positions[mesh.vertices[0]].mean(axis=0)
-            search(lost, points, self._everywhere, *state)
+        strays = missed[: search(samples.order, points, samples, *state)].copy()
+        if len(strays):  # whoever asks for NaN gets the first face
+            faces[strays], barycentric[strays] = mesh.order[0], 1.0 / 3.0
+            closest[strays] = self._pose.positions[mesh.vertices[0]].mean(axis=0)
+            search(strays, points, self._everywhere, *state)
         return Closest(faces, barycentric, closest)
 
 

@@ -155,10 +155,10 @@ def leaf_bounds(leaf, boxes, slabs, lanes, x32, useful, count, excess, hits, out
         height = n0 * x32[0, g] + n1 * x32[1, g] + n2 * x32[2, g]
         dn = max(max(low - height, height - high), zero)
         excess[g] = max(dx * dx + dy * dy + dz * dz, dn * dn) - useful[g]
-    needed = bits_at_most(excess, 0, zero) & ((1 << count) - 1)
-    while needed:
-        g = lowest_bit(needed)
-        needed &= needed - 1
+    members = bits_at_most(excess, 0, zero) & ((1 << count) - 1)
+    while members:
+        g = lowest_bit(members)
+        members &= members - 1
         _face_bounds(leaf, lanes, x32[0, g], x32[1, g], x32[2, g], g, out)
         within = bits_at_most(out, g, useful[g])
         hits[needing] = LANES * within + g

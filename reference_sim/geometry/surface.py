@@ -45,13 +45,13 @@ def faces_around(faces: np.ndarray, count: int) -> tuple[np.ndarray, np.ndarray]
 
 
 @njit(cache=True, error_model="numpy")
-def normals_of_corners(some, positions, faces, starts, around):
-    """Return the `vertex_normals` (B, 3) of the corners of some faces (n,); all others stay unset.
+def normals_of_corners(subset, positions, faces, starts, around):
+    """Return the `vertex_normals` (B, 3) of the corners of a subset (n,) of faces; all others stay unset.
 
     starts, around: see `faces_around`.
     """
     normals, is_set = np.empty_like(positions), np.zeros(len(positions), np.bool_)
-    for s in some:
+    for s in subset:
         for a in range(3):
             v = faces[s, a]
             if is_set[v]:

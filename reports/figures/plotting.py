@@ -191,8 +191,8 @@ def power_text(value: float) -> str:
 
 def escape(text: str) -> str:
     """Return the text with letters that the typesetter's fonts do not have as "U+88FE"."""
-    missing = {c for c in text if c.isalpha() and not c.isascii()} - _letters()
-    return text.translate({ord(c): f"U+{ord(c):04X}" for c in missing})
+    missing_letters = {c for c in text if c.isalpha() and not c.isascii()} - _letters()
+    return text.translate({ord(c): f"U+{ord(c):04X}" for c in missing_letters})
 
 
 @cache

@@ -154,8 +154,8 @@ def embed(folder: RunFolder, run: Run, budget: int) -> Embedded:
             embedded.missing += len(seeds)
             continue
         stored = {method: run.roll_outs.cloth(scene, method, seed) for method, seed in seeds.items()}
-        whole = {method: cloth.finite() for method, cloth in stored.items() if cloth is not None}
-        cloths = {method: cloth for method, cloth in whole.items() if cloth.frames}
+        finite_cloths = {method: cloth.finite() for method, cloth in stored.items() if cloth is not None}
+        cloths = {method: cloth for method, cloth in finite_cloths.items() if cloth.frames}
         references.setdefault(scene, cloths.get(run.reference))
         body = run.roll_outs.body(scene)
         skin = skin_of(body.positions, body.faces) if body else None
@@ -170,12 +170,12 @@ def embed(folder: RunFolder, run: Run, budget: int) -> Embedded:
             fine = cloth.status in ("ok", "converged")
             ending = "" if fine else f"{cloth.status}: {cloth.reason}"
             entry = _keep(texts, pack) | {"ending": ending}
-            new = {name: text for name, text in texts.items() if name not in embedded.texts}
-            budget -= sum(ROOM + len(text) for text in new.values())
+            additions = {name: text for name, text in texts.items() if name not in embedded.texts}
+            budget -= sum(ROOM + len(text) for text in additions.values())
             if budget < 0:
                 embedded.missing += 1
             else:
-                embedded.texts |= new
+                embedded.texts |= additions
                 embedded.scenes[scene] = {**record, "methods": {**record["methods"], method: entry}}
     return embedded
 

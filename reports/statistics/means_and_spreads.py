@@ -187,15 +187,15 @@ def pair(frame: pd.DataFrame, one: str, other: str, metric: str) -> tuple[Mean |
     Where one of them was not measured at all, the other's mean is over its own scenes.
     """
     rows = frame[frame["method"].isin((one, other)) & ((frame["metric"] == metric) | ~frame["usable"])]
-    both = match_scenes(rows, (one, other), metric)
-    by_method = means(rows[rows["scene"].isin(both)] if both else rows, "method", "metric")
+    names = match_scenes(rows, (one, other), metric)
+    by_method = means(rows[rows["scene"].isin(names)] if names else rows, "method", "metric")
     first, second = (by_method.get((method, metric)) for method in (one, other))
     if first is None or second is None:
         return first, second
-    if not both:
+    if not names:
         return None, None
     count = frame[(frame["metric"] == metric) & (frame["status"] != "skipped")]["scene"].nunique()
-    first, second = (replace(m, full_count=count * (m.full_count // len(both))) for m in (first, second))
+    first, second = (replace(m, full_count=count * (m.full_count // len(names))) for m in (first, second))
     return first, second
 
 
@@ -226,9 +226,9 @@ def count_spreads(run: Run, rows: pd.DataFrame, method: str, metric: str) -> flo
     squares = (errors["value"] - AT_REFERENCE[metric]) ** 2
     spread = error_of_twin(rows, metric)
     error = squares.groupby(errors["scene"], observed=True).mean() ** 0.5
-    both = spread.index.intersection(error.index)
-    total = float(spread[both].sum())
-    return float(error[both].sum()) / total if total > 0.0 else None
+    scenes = spread.index.intersection(error.index)
+    total = float(spread[scenes].sum())
+    return float(error[scenes].sum()) / total if total > 0.0 else None
 
 
 HALF = 50.0  # [%]
@@ -259,12 +259,12 @@ def add_shares(rows: pd.DataFrame, frames: pd.DataFrame, term: str, one: str, ot
     if frames.empty or term not in frames:
         return rows
     first, second = (frames[frames["method"] == name].dropna(subset=term) for name in (one, other))
-    both = first.merge(second, on=FRAME, suffixes=("", "_other"))
-    masks = {one: both[term] > both[f"{term}_other"], other: both[term] < both[f"{term}_other"]}
+    pairs = first.merge(second, on=FRAME, suffixes=("", "_other"))
+    masks = {one: pairs[term] > pairs[f"{term}_other"], other: pairs[term] < pairs[f"{term}_other"]}
     parts = [rows]
     for method, mask in masks.items():
         shares = (
-            (100.0 * mask).groupby([both["scene"], both["seed"]]).mean().rename("share").reset_index()
+            (100.0 * mask).groupby([pairs["scene"], pairs["seed"]]).mean().rename("share").reset_index()
         )
         terms = rows[(rows["method"] == method) & (rows["metric"] == f"energy/{term}") & rows["usable"]]
         shared = terms.merge(shares, on=["scene", "seed"])

@@ -316,6 +316,6 @@ def add_cost(frame: pd.DataFrame) -> pd.DataFrame:
     rows = frame[frame["usable"] & frame["metric"].isin(BEFORE_FRAMES)]
     cell = ["scene", "method", "seed"]
     parts = rows.groupby(cell)["value"]
-    whole = rows.assign(value=parts.transform("sum"))[parts.transform("size") == len(BEFORE_FRAMES)]
-    before = whole.drop_duplicates(cell).assign(metric=BEFORE.name, unit=BEFORE.unit)
+    sums = rows.assign(value=parts.transform("sum"))[parts.transform("size") == len(BEFORE_FRAMES)]
+    before = sums.drop_duplicates(cell).assign(metric=BEFORE.name, unit=BEFORE.unit)
     return pd.concat([frame, before], ignore_index=True)

@@ -47,8 +47,8 @@ def points_of(run: Run, rows: pd.DataFrame, metric: str) -> list[Point]:
     """
     x = run_time(rows)
     measured = rows[rows["usable"] & rows["metric"].isin([metric, x])].groupby(["method", "seed"]).size()
-    whole = measured.index[measured == 2 * rows["scene"].nunique()]
-    in_all = rows.set_index(["method", "seed"]).index.isin(whole)
+    full_pairs = measured.index[measured == 2 * rows["scene"].nunique()]
+    in_all = rows.set_index(["method", "seed"]).index.isin(full_pairs)
     rows = rows.assign(usable=rows["usable"] & in_all)
     rows = rows[rows["metric"].isin([metric, x, TIME, REPEATS]) | ~rows["usable"]]
     wide = means(rows, "method", "metric")
@@ -69,8 +69,8 @@ def points_of(run: Run, rows: pd.DataFrame, metric: str) -> list[Point]:
 def run_time(rows: pd.DataFrame) -> str:
     """Return the metric of run time of these rows: end-to-end time where every timed cell has it."""
     usable = rows[rows["usable"]].set_index(["scene", "method", "seed"])
-    inference, whole = (usable.index[usable["metric"] == name] for name in (TIME, WHOLE))
-    return WHOLE if len(whole) and inference.isin(whole).all() else TIME
+    inference, totals = (usable.index[usable["metric"] == name] for name in (TIME, WHOLE))
+    return WHOLE if len(totals) and inference.isin(totals).all() else TIME
 
 
 def time_label(metric: str) -> str:

@@ -74,7 +74,7 @@ def add_excess(
     sound_rows = rows[rows["usable"]]
     lines = sound_rows[sound_rows["metric"] == metric]
     wholes = sound_rows[sound_rows["metric"] == TOTAL]
-    whole = wholes.set_index(["scene", "method", "seed"])["value"].to_dict()
+    cell_energies = wholes.set_index(["scene", "method", "seed"])["value"].to_dict()
     parts = []
     columns = (lines[name].tolist() for name in ("scene", "method", "seed", "value", "uncertainty"))
     for place, scene, method, seed, energy, uncertainty in zip(lines.index, *columns):
@@ -85,7 +85,7 @@ def add_excess(
             # The reference is zero by definition, whichever simulation it is.
             moved = () if method == run.reference else tuple((k, v - value) for k, v in shares.items())
             share = 100.0 / (total[SKINNING] - total[run.reference])
-            energy_of_cell = whole.get((scene, method, seed))
+            energy_of_cell = cell_energies.get((scene, method, seed))
             if energy_of_cell is None:
                 worn = value >= LEAST
             else:
@@ -171,8 +171,8 @@ def excess_of(run: Run, rows: pd.DataFrame, method: str) -> Excess | None:
     if one is None or zero is None:
         return None
     totals = _values(rows, TOTAL, [run.reference, SKINNING])
-    whole = {motion: totals[motion][SKINNING] - totals[motion][run.reference] for motion, _ in one.cells}
-    return Excess(effect(one, zero, EXCESS), one.cells, whole, one.fewer)
+    scales = {motion: totals[motion][SKINNING] - totals[motion][run.reference] for motion, _ in one.cells}
+    return Excess(effect(one, zero, EXCESS), one.cells, scales, one.fewer)
 
 
 def own_excess_of(run: Run, rows: pd.DataFrame, method: str) -> Effect | None:

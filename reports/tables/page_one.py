@@ -66,5 +66,5 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
     )
     caption = of_motions if garment else f"Means {say_where(scenes)}"
     caption += f"; run times (and energy gaps) {say_where(scenes)}." if garment and scenes else "."
-    tables = [made.drop_empty() for made in table("overview", columns, lines, caption)]
-    return [made for made in tables if made.columns != (METHOD,)]
+    tables = [part.drop_empty() for part in table("overview", columns, lines, caption)]
+    return [part for part in tables if part.columns != (METHOD,)]

@@ -69,7 +69,7 @@ def _energies(run: Run, means: pd.Series, name: str, pbns: str, snug: str) -> li
             ratios = [
                 two / one if one and two and term != "gravity" else None for one, two in (ours, printed)
             ]
-            lines.append((motions, term, *(x for both in zip(ours, printed) for x in both), *ratios))
+            lines.append((motions, term, *(x for pair in zip(ours, printed) for x in pair), *ratios))
     columns = (
         MOTIONS, Column("energy", "Energy", text=True),
         Column("pbns", "PBNS", "J"), Column("pbns_paper", "PBNS, in the paper", "J", trim=True),

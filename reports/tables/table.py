@@ -179,9 +179,9 @@ class Table:
                 moved = [m.uncertainty if m else None for m in means]
                 if any(x is not None for x in moved):
                     texts[f"{column.name}_uncertainty"] = [csv_number(x) for x in moved]
-                missing = [m.missing if m else 0 for m in means]
-                if any(missing):
-                    texts[f"{column.name}_lacking"] = [str(count) for count in missing]
+                counts = [m.missing if m else 0 for m in means]
+                if any(counts):
+                    texts[f"{column.name}_lacking"] = [str(count) for count in counts]
             if any(isinstance(cell, Effect) for cell in cells):
                 parts = zip(*map(_parts_of_effect, cells))
                 texts |= {f"{column.name}_{part}": list(cell) for part, cell in zip(EFFECT_PARTS, parts)}

@@ -73,14 +73,14 @@ def paper_table(run: Run) -> Table:
         Column("own_excess", "Own excess", "%"), Column("relative_excess", "Relative excess", "%"),
         *(metric_column(metric) for metric, _ in sources),
     ]  # fmt: skip
-    shown = [cell for line in lines for cell in line if isinstance(cell, Effect)]
-    whole = any(effect.interval for effect in shown)
-    remark = "" if all(effect.complete for effect in shown) else REMARKS["*"]
+    cells = [cell for line in lines for cell in line if isinstance(cell, Effect)]
+    has_intervals = any(cell.interval for cell in cells)
+    remark = "" if all(cell.complete for cell in cells) else REMARKS["*"]
     caption = (
         f"{run.first_garment or 'All scenes'}: means over independent sources of motion and over seeds, of "
-        f"excess geometric{'; below: 95 % intervals, of times the range' if whole else ''}. Excess: energy "
-        "above a reference solver's as a share of skinning's, in each method's own energies and in common "
-        "ones. "
+        f"excess geometric{'; below: 95 % intervals, of times the range' if has_intervals else ''}. "
+        "Excess: energy above a reference solver's as a share of skinning's, in each method's own energies "
+        "and in common ones. "
         f"Protocol {run.protocol or 'own'}; cite: {CITATION}, at {run.config.get('commit') or 'no commit'}. "
         f"{remark}"
     ).rstrip()

@@ -178,8 +178,8 @@ def _overview(folders: Sequence[Path], columns: Sequence[str], methods: Sequence
     heads: list[str] = []
     rows: dict[str, list[str]] = {}
     for run in map(read_published, folders):
-        missing = [name for name in methods if name in run.methods and name not in rows]
-        head, *lines = text_rows(run, overview(run, missing)[0], columns)
+        additions = [name for name in methods if name in run.methods and name not in rows]
+        head, *lines = text_rows(run, overview(run, additions)[0], columns)
         if heads and head != heads:
             raise ValueError(
                 f"page one has the columns {', '.join(head)} in one of {', '.join(map(str, folders))}"
@@ -187,7 +187,7 @@ def _overview(folders: Sequence[Path], columns: Sequence[str], methods: Sequence
         heads = head
         star = "*" * bool(rows)
         rows |= {
-            method: [f"{line[0]}{star}", *line[1:]] for method, line in zip(run.order(missing), lines)
+            method: [f"{line[0]}{star}", *line[1:]] for method, line in zip(run.order(additions), lines)
         }
     return [heads, *(rows[name] for name in methods)]
 

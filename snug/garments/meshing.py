@@ -72,9 +72,9 @@ def delaunay_flips(points: Array, faces: Index, *, passes: int = 3) -> Index:
 
 
 def relax(
-    points: Array, faces: Index, held: NDArray[np.bool_], surface: ImplicitSurface
+    points: Array, faces: Index, rim: NDArray[np.bool_], surface: ImplicitSurface
 ) -> tuple[Array, Index]:
-    """Move vertices along the surface towards larger triangles, flip edges; `held` (V,) stay."""
+    """Move vertices along the surface towards larger triangles, flip edges; `rim` (V,) stay."""
     points = points.copy()
     for _ in range(RELAXATIONS):
         faces = delaunay_flips(points, faces, passes=1)
@@ -86,7 +86,7 @@ def relax(
             np.add.at(weight, faces[:, k], pull)
             np.add.at(target, faces[:, k], pull[:, None] * centroids)
         moved = points + RELAXATION_STEP * (target / weight[:, None] - points)
-        points[~held] = surface.project(moved[~held])
+        points[~rim] = surface.project(moved[~rim])
     return points, delaunay_flips(points, faces)
 
 
@@ -157,9 +157,9 @@ def remesh(
     for outline in outlines:
         centre = np.concatenate(outline).mean(axis=0)
         _place_rim(coarse, loops[int(np.argmin(np.linalg.norm(centres - centre, axis=1)))], outline)
-    held = np.zeros(len(coarse), dtype=bool)
-    held[np.concatenate(loops)] = True
-    return relax(coarse, triangles, held, surface)
+    rim = np.zeros(len(coarse), dtype=bool)
+    rim[np.concatenate(loops)] = True
+    return relax(coarse, triangles, rim, surface)
 
 
 AREA_BOUNDS = (0.5, 2.0)  # every triangle's area over the mean
@@ -201,10 +201,10 @@ def mesh_garment(
             points = _keep_off(body, points, faces, cuts, clearance)
             seam = points[:, 0] == 0
             twin = np.where(seam, np.arange(len(points)), len(points) + np.cumsum(~seam) - 1)
-            whole = np.concatenate([points, points[~seam] * [-1.0, 1.0, 1.0]])
+            whole_points = np.concatenate([points, points[~seam] * [-1.0, 1.0, 1.0]])
             whole_faces = np.concatenate([faces, twin[faces][:, ::-1]])
-            _check_even(whole, whole_faces, openings)
-            return whole, whole_faces
+            _check_even(whole_points, whole_faces, openings)
+            return whole_points, whole_faces
         except ValueError as error:
             problem = str(error)
     raise ValueError(f"vertices={vertices}: no sound mesh of this size ({problem}); ask for more")

@@ -143,8 +143,8 @@ def _height(
     skin, m: positions and normals of the body, flat as `mix_rows` wants them.
     """
     i, j, k = faces[face, 0], faces[face, 1], faces[face, 2]
-    whole = np.float32(1.0) / np.float32(PARTS)
-    v, w = whole * np.float32(parts[0]), whole * np.float32(parts[1])
+    unit = np.float32(1.0) / np.float32(PARTS)
+    v, w = unit * np.float32(parts[0]), unit * np.float32(parts[1])
     u = np.float32(1.0) - v - w
     c0, c1, c2 = mix_rows(skin, i, j, k, u, v, w)
     n0, n1, n2 = mix_rows(m, i, j, k, u, v, w)

@@ -198,12 +198,12 @@ def _cell_back(
             copy_lanes(array, place, u, 4 + part)
         for j in range(L):
             r, z, n, q = u[j], u[L + j], u[2 * L + j], u[3 * L + j]
-            whole = u[4 * L + j] + u[5 * L + j]
-            to_n = whole * (_ONE - z) * (_ONE - n * n)
+            gradient = u[4 * L + j] + u[5 * L + j]
+            to_n = gradient * (_ONE - z) * (_ONE - n * n)
             u[j] = to_n * q * r * (_ONE - r)
-            u[L + j] = whole * (u[6 * L + j] - n) * z * (_ONE - z)
+            u[L + j] = gradient * (u[6 * L + j] - n) * z * (_ONE - z)
             u[2 * L + j], u[3 * L + j] = to_n, to_n * r
-            u[4 * L + j] = whole * z
+            u[4 * L + j] = gradient * z
         for part in range(3):
             copy_lanes(u, part, to_inputs, (3 * row + part) * blocks + block)
             copy_lanes(u, part + (part == 2), to_recurrent, (3 * row + part) * blocks + block)

@@ -153,6 +153,6 @@ class TwoBranches(GarmentNetwork):
 
 def _repeat(layer: nn.Linear, count: int) -> nn.Linear:
     """Return a layer without bias that does the same to each of `count` pieces of its inputs."""
-    whole = nn.Linear(count * layer.in_features, count * layer.out_features, bias=False)
-    whole.weight = nn.Parameter(torch.block_diag(*[cast(Tensor, layer.weight.detach())] * count))
-    return whole
+    wide_layer = nn.Linear(count * layer.in_features, count * layer.out_features, bias=False)
+    wide_layer.weight = nn.Parameter(torch.block_diag(*[cast(Tensor, layer.weight.detach())] * count))
+    return wide_layer

@@ -85,18 +85,18 @@ def prepare_roll_out(
     `prepare_frames`.
     """
     frames = prepare_frames(model, dressed, motion, betas, earlier=earlier)
-    held = np.arange(motion.frames) if kept is None else kept
-    places = {int(frame): place for place, frame in enumerate(held)}
+    numbers = np.arange(motion.frames) if kept is None else kept
+    places = {int(frame): place for place, frame in enumerate(numbers)}
 
     def run() -> Trajectory:
-        positions, seconds = np.empty((len(held), dressed.vertices, 3)), np.empty(len(held))
+        positions, seconds = np.empty((len(numbers), dressed.vertices, 3)), np.empty(len(numbers))
         clock = time.perf_counter()
         for frame, x in enumerate(frames()):
             x = x if postprocess is None else postprocess(x, frame)
             before, clock = clock, time.perf_counter()
             if frame in places:
                 positions[places[frame]], seconds[places[frame]] = x, clock - before
-        return _trajectory(model, dressed, motion, positions, held, seconds)
+        return _trajectory(model, dressed, motion, positions, numbers, seconds)
 
     return run
 
@@ -130,16 +130,16 @@ def _trajectory(
     dressed: DressedBody,
     motion: Motion,
     positions: np.ndarray,
-    held: np.ndarray,
+    numbers: np.ndarray,
     seconds: np.ndarray,
 ) -> Trajectory:
-    """Return the trajectory of world positions (T, V, 3) [m] of the frames `held` of the motion."""
+    """Return the trajectory of world positions (T, V, 3) [m] of the frames `numbers` of the motion."""
     finite = np.isfinite(positions).all()
     method = dict(method=model.kind, recipe=model.recipe.name, seed=model.seed) if model else SKINNING
     return Trajectory(
         positions=positions,
         faces=dressed.garment.faces,
-        times=held / motion.fps,
+        times=numbers / motion.fps,
         frame_seconds=seconds,
         status="ok" if finite else "diverged",
         reason="" if finite else "the network gave a position that is not finite",
@@ -197,8 +197,8 @@ def prepare_frames(
     features, network, recipe = np.empty((motion.frames, 0), np.float32), None, DEFAULT
     if model is not None:
         network, recipe = model.network, model.recipe
-        whole = earlier.followed_by(motion) if earlier else motion
-        features = _features(model, dressed, whole, betas).numpy()
+        full_motion = earlier.followed_by(motion) if earlier else motion
+        features = _features(model, dressed, full_motion, betas).numpy()
     frame = CompiledFrame(dressed.rest(betas), dressed.weights(recipe.smoothing), network)
     transforms, pelvis = dressed.transforms(motion.poses, betas).numpy(), dressed.pelvis(motion, betas)
     past, features = features[: -motion.frames], features[-motion.frames :]
@@ -231,8 +231,8 @@ def prepare_frame_inputs(
     It gives features (D,), or None without a model, joint transforms (24, 3, 4) and pelvis (3,) [m]: the
     same numbers that `prepare_frames` makes for all frames at once. Raises ValueError.
     """
-    whole = earlier.followed_by(motion) if earlier else motion
-    first = whole.frames - motion.frames
+    full_motion = earlier.followed_by(motion) if earlier else motion
+    first = full_motion.frames - motion.frames
     past = 0 if model is None else FEATURE_SETS[model.network.feature_set]
 
     def inputs(frame: int) -> tuple[Tensor | None, Tensor, np.ndarray]:
@@ -240,7 +240,7 @@ def prepare_frame_inputs(
         transforms, pelvis = dressed.transforms(now.poses, betas)[0], dressed.pelvis(now, betas)[0]
         if model is None:
             return None, transforms, pelvis
-        recent = whole.cut(max(first + frame - past, 0), first + frame + 1)
+        recent = full_motion.cut(max(first + frame - past, 0), first + frame + 1)
         return _features(model, dressed, recent, betas)[-1], transforms, pelvis
 
     return inputs

@@ -123,10 +123,10 @@ class CapturedTrainer(Trainer):
 
     def _follow(self) -> None:
         """Follow the gradients, and keep the places of the anchors."""
-        held = self._held
+        tensors = self._held
         taught = [p for p in self.network.parameters() if p.grad is not None]
         # A step in single operations has its own.
-        for parameter, gradient in zip(taught, held["gradients"]):
+        for parameter, gradient in zip(taught, tensors["gradients"]):
             parameter.grad = gradient
         on_gpu = self.device.type == "cuda"
         for group in self.optimiser.param_groups:
@@ -136,4 +136,4 @@ class CapturedTrainer(Trainer):
             group["capturable"] = False  # else torch warns of every step in single operations
         if self.contact:
             assert isinstance(self.contact.cache, TensorContactCache)
-            self.contact.cache.place(held["rows"].flatten(), held["anchors"])
+            self.contact.cache.place(tensors["rows"].flatten(), tensors["anchors"])

@@ -132,12 +132,12 @@ class TensorContactCache:
         distances = torch.where(inside | ~inside.any(1, keepdim=True), distances, torch.inf)
         nearest = distances.topk(min(NEAREST, len(positions)), largest=False).indices
         faces = self.around[nearest].flatten(1)  # (S, NEAREST K)
-        some = faces.clamp(min=0)
-        a, b, c = positions[self.corners[some]].unbind(-2)
+        indices = faces.clamp(min=0)
+        a, b, c = positions[self.corners[indices]].unbind(-2)
         s, t, r = b - a, c - a, points[:, None] - a
         v, w = closest_on_triangle(s, t, r)
         squared = (r - v[..., None] * s - w[..., None] * t).square().sum(-1)
-        away = (self.centroids[some] - home[:, None]).square().sum(-1)
+        away = (self.centroids[indices] - home[:, None]).square().sum(-1)
         outside = away >= self.patch.region**2
         squared = torch.where(faces < 0, torch.inf, squared + FORBIDDEN * outside)
         best = squared.argmin(1, keepdim=True)

@@ -54,8 +54,8 @@ class BodyPatches:
             return torch.as_tensor(array[vertices], dtype=torch.float32, device=device)
 
         self.weights, self.template = part(body.skinning_weights), part(body.template)
-        self.directions, given = part(body.shape_directions), body.pose_directions
-        self.correctives = None if given is None else part(given)
+        self.directions, correctives = part(body.shape_directions), body.pose_directions
+        self.correctives = None if correctives is None else part(correctives)
         self._pose = compile_for(self._pose_by_torch, device)
         self.kept = self._pose_everywhere() if fixed and self.kernels else None
 
@@ -114,9 +114,9 @@ class BodyPatches:
         positions, normals = np.empty(shape, np.float32), np.empty(shape, np.int8)
         for rest, frames in self._list_patches():
             for start in range(frames.start, frames.stop, POSED_TOGETHER):
-                some = slice(start, min(start + POSED_TOGETHER, frames.stop))
-                transforms = self.data.transforms[None, some]
-                positions[some], normals[some] = self._pose_by_kernels(rest, transforms)
+                chunk = slice(start, min(start + POSED_TOGETHER, frames.stop))
+                transforms = self.data.transforms[None, chunk]
+                positions[chunk], normals[chunk] = self._pose_by_kernels(rest, transforms)
         return positions, normals
 
     def _list_patches(self) -> Iterator[tuple[Tensor, slice]]:
@@ -208,8 +208,8 @@ class TrainingContact:
         """
         walk = x is not None
         if walk:
-            held = np.unique(batch.frames)
-            self._before = self.age.copy(), held, *(table[held] for table in self._tables())
+            numbers = np.unique(batch.frames)
+            self._before = self.age.copy(), numbers, *(table[numbers] for table in self._tables())
         if isinstance(self.cache, ContactCache):
             cache, (of_body, *body) = self.cache, posed
             rows = of_body.reshape(batch.frames.shape)
@@ -291,8 +291,8 @@ class TrainingContact:
         if self._before and not trusted:
             age, rows, *before = self._before
             self.age[:] = age
-            for table, held in zip(self._tables(), before):
-                table[rows] = held
+            for table, values in zip(self._tables(), before):
+                table[rows] = values
         self._before = None
         self._changed[frames.ravel()] = True
 
@@ -332,7 +332,7 @@ class TrainingContact:
         changed = tensors["changed"].numpy()
         self._changed[changed] = True
         for table, name in zip(self._tables(), ("faces", "barycentric")):
-            held = torch.as_tensor(table)  # shares memory
-            held[torch.as_tensor(changed, device=held.device)] = tensors[name].to(held.device)
+            view = torch.as_tensor(table)  # shares memory
+            view[torch.as_tensor(changed, device=view.device)] = tensors[name].to(view.device)
         self.age[:] = tensors["age"].numpy()
         self._credit = facts["credit"]

@@ -275,8 +275,8 @@ class Trainer:
         facts: dict[str, Any] = {"epoch": self.epoch, "random": self.random.bit_generator.state}
         for name, part in (("guard", self.guard), ("contact", self.contact)):
             if part is not None:
-                held, facts[name] = part.state()
-                tensors.update({f"{name}.{key}": tensor for key, tensor in held.items()})
+                state, facts[name] = part.state()
+                tensors.update({f"{name}.{key}": tensor for key, tensor in state.items()})
         return tensors, facts
 
     def resume(self, tensors: dict[str, Tensor], facts: dict[str, Any]) -> None:

@@ -108,10 +108,9 @@ def as_before():
     path, modules = list(sys.path), set(sys.modules)
     yield
     sys.path[:] = path
-    installed = (str(Path(run.__file__).parent.parent), sys.prefix, *filter(None, path))
     for name in set(sys.modules) - modules:
         file = getattr(sys.modules[name], "__file__", None) or sys.prefix  # of torch, written in C
-        if not file.startswith(installed):
+        if not file.startswith((str(Path(run.__file__).parent.parent), sys.prefix, *filter(None, path))):
             del sys.modules[name]
     metrics.list_metrics.cache_clear()
     forget()
