@@ -55,7 +55,7 @@ SIZES = replace(
     find_preset("smoke"), garment_vertices=300, frames=8, clip_frames=8, warm_up_frames=2, settle_frames=4,
     sheet_cells=4, sheet_frames=6, cell_seconds=120.0, least_seconds=0.02, repeats=1,
 )  # fmt: skip
-PLACE_TOLERANCE = 1e-6  # [m] of what should be in its place; times a frame's length in float32
+PLACE_TOLERANCE = 1e-6  # [m] of a point in its place; times a frame's length in float32
 # Factor of the clock by which what frames say of themselves may be more, in all.
 CLOCK_SLACK = 1.1
 DISPLACEMENT = 0.02  # of the mean edge, for the places at which derivatives are compared

@@ -35,7 +35,7 @@ CODE = ("reference_sim", "snug", "benchmarks", ":!benchmarks/studies", ":!benchm
         ":!*.safetensors", ":!*.md")  # fmt: skip
 
 
-@cache  # that of the first call, which is nearer to the code that was loaded than a later one
+@cache  # the first call is nearest to the code that was loaded
 def commit() -> str:
     """Return the last commit that changed CODE, "+changes" where its files differ; else the package version.
 

@@ -45,7 +45,7 @@ DECLARED = "cost/frame"  # the one cost that an entry has: as its authors say
 KEPT = ("preset", "commit", "metrics", "methods", "scenes", "cases")  # of run.json
 PICTURE = "picture.png"
 SAMPLED, VERTICES = "sampled.npz", 20  # so many vertices of each roll-out: by them copies are found
-COPIED, SAME = 0.9, 1e-4  # share of frames, and their root mean square distance [m], of a copy
+COPIED, SAME = 0.9, 1e-4  # of a copy: share of frames, and their rms distance [m]
 EXAMPLES = """examples:
   python -m benchmarks.export tshirt/dance_turn -o dance            a scene, to be dressed elsewhere
   python -m benchmarks.submit check submissions/mine                seconds: metadata, files, protocol

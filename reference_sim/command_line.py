@@ -80,7 +80,7 @@ def command(
     return with_status
 
 
-SECONDS_OF_A_LOG = 30.0  # between two lines; on a terminal the line is drawn ten times a second
+SECONDS_OF_A_LOG = 30.0  # between two lines; a terminal has ten a second
 
 
 def progress_bar(*args: Any, **options: Any) -> Any:

@@ -94,7 +94,7 @@ class Trajectory:
             return _read(Path(path))
         except FileNotFoundError:
             raise TrajectoryError(f"{path}: no such trajectory file") from None
-        except Exception as error:  # whatever h5py and numpy raise for a file that is none, or is damaged
+        except Exception as error:  # whatever h5py and numpy raise for a damaged file
             reason = " ".join(str(error).split())
             raise TrajectoryError(f"{path}: not a VTKHDF trajectory of this project ({reason})") from None
 

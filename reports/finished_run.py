@@ -19,7 +19,7 @@ from benchmarks.results.run_folder import RunFolder
 from reference_sim.files.array_file import read_arrays
 from reference_sim.trajectory import Trajectory, TrajectoryError
 
-STEP = "step/vertices"  # of the curves of a roll-out: the one-step error of each vertex (T,V) [mm]
+STEP = "step/vertices"  # curve of a roll-out: one-step error of each vertex (T,V) [mm]
 
 
 @dataclass(frozen=True)

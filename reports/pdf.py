@@ -46,7 +46,7 @@ def _text(value: Any) -> str:
 
 Values = dict[str, Any]  # of one block, as JSON takes them
 WHOLE = 8  # rows of a table that stays on one page, as that of page one
-FEW = 5  # up to so many columns, the columns of a table share its width evenly
+FEW = 5  # up to so many columns share a table's width evenly
 
 
 def lay_out(report: Report, block: Figure | TableBlock) -> list[Values]:

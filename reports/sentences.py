@@ -83,12 +83,12 @@ def verdict(run: Run, frame: pd.DataFrame) -> str:
     several = run.garment_rows["garment"].nunique() > 1
     motion = "motion" + f" of the {run.first_garment}" * several
     text = (
-        f"In {'a typical' if len(scenes) > 1 else 'one'} {_kind(run, scenes)}{motion} {run.label(name)} "
-        f"has {number(excess.typical, 2)} % of skinning's excess energy over a converged simulation"
+        f"In {'a typical' if len(scenes) > 1 else 'one'} {_kind(run, scenes)}{motion} {run.label(name)}'s "
+        f"excess energy over a converged simulation is {number(excess.typical, 2)} % of skinning's"
     )
     text += f" ({number(excess.pooled, 2)} % summed over all motions)" if len(scenes) > 1 else ""
     if times := _times_faster(run, name):
-        text += f", and is more than {times} times faster than the simulation"
+        text += f", and {run.label(name)} is more than {times} times faster than the simulation"
     if (correlation := value_of(frame, name, ALIKE)) is not None:
         text += f"; the dynamics of its hem {likeness(correlation)} the simulation's"
     return f"{text}{excess.fewer}."

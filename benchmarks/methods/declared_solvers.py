@@ -79,7 +79,7 @@ SOLVERS = (
         _declare_variant(
             f"1e-{power}", f" to 1e-{power}", f", minimised to tolerance 1e-0{power}", "tolerance",
             tolerance := float(f"1e-{power}"), tolerance=tolerance,
-            timed=power < 8,  # at its tightest it is another reference, whose time nobody asks for
+            timed=power < 8,  # at its tightest it is another reference
         )
         for power in (2, 4, 8)
     ),

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 Array = np.ndarray
 
 TURNING = np.deg2rad(5.0)  # rms static yaw from which on gain and lag are those of the yaw
-SHIFTING = 5e-3  # [m] rms static displacement below which there is nothing to be a gain of
+SHIFTING = 5e-3  # [m] rms static displacement below which there is no gain
 MAX_LAG = 12.0  # frames
 SHORTEST = 8  # frames of which a motion can be said
 NO_MOTION = 1e-6  # [m] rms of a dynamic part that is none

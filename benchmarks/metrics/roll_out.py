@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 AFTER = (1, 10, 30)  # frames after the glitch
 OF_CLOTH = ("strain", "bending", "inertia")
-LOST = 0.5  # [m] from the skinned shirt: a vertex so far off is on no body any more
+LOST = 0.5  # [m] from the skinned shirt: farther off is on no body
 
 
 def measure_extrapolation(roll_out: RollOut) -> dict[str, float]:

@@ -135,7 +135,7 @@ class RunFolder:
 
 ROLES = ("reference", "baseline", "network")
 CELL = ("scene", "method", "seed", "seconds")
-SECONDS = "judged/seconds"  # among the curves of a cell: of each frame, nan where it is not judged
+SECONDS = "judged/seconds"  # curve of a cell, nan where a frame is not judged
 ENERGY = "energy/"
 
 

@@ -128,7 +128,7 @@ def check_methods(plan: Plan) -> Assets | None:
     except (RollOutFileError, RunRefused):
         raise
     except ValueError:
-        pass  # of what cannot be made or built the run says so itself, for all methods
+        pass  # the run says itself what cannot be made or built
     return assets
 
 

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from benchmarks.validation.case import Case
 
 MS = 1e3
-SPREAD = 0.2  # repeats further apart than this share of their median deserve a remark
+SPREAD = 0.2  # of the median: repeats further apart get a remark
 
 Outcomes = Mapping[TaskId, Outcome]
 

@@ -66,7 +66,7 @@ def box() -> tuple[np.ndarray, np.ndarray]:
 
 RADIUS = 1.0  # [m] of the sphere
 START = 0.3  # [rad] from the top
-HARD = 1e11  # [J/m^5] of the sphere, so that the point never lags behind its resting depth
+HARD = 1e11  # [J/m^5] of the sphere: the point stays at its resting depth
 DRUM = 0.2  # [m] radius of the cylinder
 SLACK = 0.1  # [m] of each end of the strip below the axis
 PULL = 2.0  # [N/m] at its ends, about, so that it never hangs slack

@@ -18,7 +18,7 @@ from benchmarks.validation.case import Measurement
 from reference_sim import energies
 from reference_sim.geometry.topology import corner_areas
 
-RELATIVE_RESIDUAL = 1e-6  # of a step: largest gradient component over the mean weight of a vertex
+RELATIVE_RESIDUAL = 1e-6  # largest gradient component over a vertex's mean weight
 ROUND_OFF = 1e-2  # relative residual that round-off may at most excuse
 EVALUATION_ROUND_OFF = 1e-6  # of the sum of the terms' sizes: by more the energy may not rise
 TIMEOUT = 20.0  # [s] that the solver gives itself

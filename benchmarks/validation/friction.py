@@ -136,7 +136,7 @@ def _patch(
     return x.mean(axis=1)
 
 
-HARD = 3.4e10  # [J/m^5]: the strip lies a hundredth as deep in the margin as on a body
+HARD = 3.4e10  # [J/m^5]: the strip lies a hundredth as deep as on a body
 TURN = 0.02  # [rad] of the drum in a step
 
 

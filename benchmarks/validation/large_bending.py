@@ -150,7 +150,7 @@ def _catenary(columns: int) -> dict[str, float]:
     return {"force": float(force), "sag": float(-x[middle, 1].mean())}
 
 
-BUCKLING_STIFFNESS = 1e-5  # [J] so small that the strip hardly sags in its own plane before it buckles
+BUCKLING_STIFFNESS = 1e-5  # [J] so small that the strip hardly sags in plane before it buckles
 BUCKLING_MATERIAL = sim.Material(poisson_ratio=0.3, bending_stiffness=BUCKLING_STIFFNESS)
 CRITICAL = {"end": 4.0126, "weight": 12.85}  # total load, over (EI GJ)^0.5 / L^2
 BUCKLING_ROWS = (4, 8)

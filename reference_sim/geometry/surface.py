@@ -133,7 +133,7 @@ def plane_normals(points, closest, closest_faces, barycentric, vertices, faces, 
             x, y, z, _ = _unit(ball * m0 + length * x, ball * m1 + length * y, ball * m2 + length * z)
         else:
             outwards = np.sign(cosine)
-            if min(u, v, w) > 0.0:  # inside the face its normal is the direction, and has no cancellation
+            if min(u, v, w) > 0.0:  # inside the face: its normal has no cancellation
                 n = cross_of_face(vertices, i, j, k)
                 side = np.sign(n[0] * x + n[1] * y + n[2] * z)
                 x, y, z, _ = _unit(side * n[0], side * n[1], side * n[2])

@@ -225,7 +225,7 @@ class CompiledLBFGS:
 
     def start_again(self) -> None:
         """Forget what the last step taught, as before a first one."""
-        self._first_step = 1.0  # what the first direction of the last step allowed: most of the next too
+        self._first_step = 1.0  # allowed by the first direction of the last step, mostly again
 
     def minimise(self, x0: np.ndarray) -> Result:
         """Run from x0 (V, 3) [m]: status "max_iterations", "stalled" or "diverged"."""

@@ -39,7 +39,7 @@ from reference_sim.potential import Potential
 CONVEXITY = (0.0, 0.15, 0.3, 0.6, 1.0)
 MAX_SHIFT = 1e12  # beyond it a step is shorter than round-off
 STEP_TOLERANCE = 1e-3  # of a mean edge length
-WATCHDOG_AFTER = 20  # iterations: most steps of a garment are done by then, and sooner so
+WATCHDOG_AFTER = 20  # iterations: most steps of a garment end sooner
 WATCHDOG_STEPS = 40  # full steps in a row before the energy has to be below its start
 # Share of the predicted decrease from which on the quadratic model needs no help.
 PREDICTED = 0.9

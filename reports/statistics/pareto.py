@@ -11,7 +11,7 @@ from reports.finished_run import Run
 from reports.statistics.means_and_spreads import error_of_twin, mean_of, means
 
 TIME, REPEATS = "cost/frame", "cost/spread"
-WHOLE = "cost/whole"  # TIME is a method's own work; this is all from pose to world vertices
+WHOLE = "cost/whole"  # from pose to world vertices; TIME is a method's own work
 # Of the method's own step first: no chaos blurs them. Then those of the roll-out against the
 # simulation's.
 ERRORS = (

@@ -148,7 +148,7 @@ def front_sentences(run: Run) -> str:
     scene, peak = excesses[NETWORK].worst
     lines = (
         f"**{verdict(run, rows)}**\n",
-        f"- Good at: energy for its time. Supervised has {supervised} "
+        f"- Good at: low energy in little time. Supervised has {supervised} "
         f"(against SNUG p {number(p_values[UNSEEN], 2)}, corrected), PBNS {pbns}; "
         f"{run.label(SOLVER)}, has {stopped} ({interval or DASH}) and takes "
         f"{number(times[SOLVER] / times[NETWORK], 1)} times as long as SNUG.",

@@ -17,7 +17,7 @@ from snug.body.parametric_body import Body
 from snug.body.skeleton import JOINT_NAMES
 from snug.garments.implicit_surface import joint_position, skin_following
 
-SHAPE_SMOOTHING = 10  # rounds over a shape's displacement: nearest vertices jump from leg to leg
+SHAPE_SMOOTHING = 10  # rounds over a shape's displacement, which jumps from leg to leg
 # Rounds over the weights at 1000 vertices of cloth that spans both thighs: between them it follows
 # neither.
 SKIRT_SMOOTHING = 60

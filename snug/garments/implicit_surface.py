@@ -57,7 +57,7 @@ def joint_position(body: Body, name: str) -> Array:
     return body.joint_template[JOINT[name]]
 
 
-GRID_SPACING = 0.012  # [m] grid of the surface: finer than any cloth edge that the tests ask for
+GRID_SPACING = 0.012  # [m] of the grid: finer than any cloth edge in the tests
 SUPPORT_DIRECTIONS = 64  # support directions of a convex section: 0.1 % of girth
 ARMPIT_FILLET = 0.08  # [m] range over which torso and sleeve melt into each other
 CROTCH_FILLET = 0.03  # [m] the same between torso and leg

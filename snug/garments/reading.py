@@ -48,7 +48,7 @@ ENDS = ("head", "left_wrist", "right_wrist", "left_hand", "right_hand", "left_an
         "left_foot", "right_foot")  # fmt: skip
 # share of the area that looks away from the skin, below which a piece is inside out
 OUTWARD = 0.5
-AREAL_DENSITIES = 0.005, 5.0  # [kg/m^2], lightest and heaviest cloth: beyond them a unit is mistaken
+AREAL_DENSITIES = 0.005, 5.0  # [kg/m^2] of cloth: beyond them a unit is mistaken
 
 
 def read_garment(file: GarmentFile | str | Path, body: Body) -> Garment:

@@ -20,7 +20,7 @@ from snug.motion.motion import Motion, MotionError
 from snug.motion.recording import finite_numbers, frame_rate, parse_lines
 from snug.motion.retarget import FEET, LIMBS, match_joints, retarget, way_up
 
-MAX_LEAN = 40.0  # [degrees] of the trunk of a zero pose: its spine takes our upright one's place
+MAX_LEAN = 40.0  # [degrees] of the trunk in a zero pose, which replaces our upright one
 CHANNELS = {f"{axis}{kind}" for kind in ("position", "rotation") for axis in "XYZ"}
 
 

@@ -69,7 +69,7 @@ class Stride:
     hip: Curve
     knee: Curve
     ankle: Curve
-    toe_off: float  # percent of the stride; below 50 there is a flight before the other foot lands
+    toe_off: float  # percent of the stride; below 50 there is a flight phase
     pelvis_pitch: float
     pelvis_yaw: float  # amplitudes of the first harmonic
     pelvis_roll: float
@@ -226,7 +226,7 @@ def _periodic(curve: Curve, at: np.ndarray) -> np.ndarray:
     return CubicSpline(percent / 100.0, degrees, bc_type="periodic")(at)
 
 
-FROZEN_FRAMES = 36  # frames after the stop: over a second, in which a hem comes to rest
+FROZEN_FRAMES = 36  # after the stop: over a second, in which a hem comes to rest
 STANCE = {
     f"{side}_{name}": degrees
     for side in ("left", "right")

@@ -35,7 +35,7 @@ RATE = 120.0  # [1/s] at which motions are built
 # Muscles do not start at once: standard deviation of the Gaussian over all angles.
 SMOOTHING = 0.03  # [s]
 FREE_FALL = 9.81  # [m/s^2]
-CONTACT_DEPTH = 0.01  # [m] a sole point this much higher than the lowest carries 1/e of its weight
+CONTACT_DEPTH = 0.01  # [m] above the lowest sole point, where one carries 1/e of its weight
 
 
 def poses_from_angles(angles: Mapping[str, np.ndarray | float], frames: int) -> np.ndarray:

@@ -95,7 +95,7 @@ def frame_rate(
 MAX_TURN_SPEED = np.deg2rad(30.0) * 120.0  # [rad/s]
 MAX_ROOT_SPEED = 10.0  # [m/s] of the root: a sprinter's speed
 # A joint that turns further, or a root that is further away, was not written in radians or metres.
-MAX_ANGLE = 4.0 * np.pi  # [rad] of all joints but the root, whose turns may have been added up
+MAX_ANGLE = 4.0 * np.pi  # [rad] of a joint; turns of the root may add up
 MAX_ROOT_ANGLE = 1e3  # [rad] of the root
 MAX_DISTANCE = 1e4  # [m]
 

@@ -141,6 +141,6 @@ def _pose_numbers(poses: np.ndarray, rotations: np.ndarray, pose_input: str) -> 
     """
     if pose_input == "axis_angle":
         return poses.reshape(len(poses), -1)
-    up = rotations[:, 0, 1, :]  # R^T e_y: a walk to the east and a walk to the north give the same input
+    up = rotations[:, 0, 1, :]  # R^T e_y: the same for a walk to the east and to the north
     columns = rotations[:, 1:, :, :2].swapaxes(-1, -2)
     return np.concatenate([up, columns.reshape(len(poses), -1)], axis=1)

@@ -26,7 +26,7 @@ from snug.recipe import DEFAULT
 WARM_UP = 10  # frames computed and thrown away, before the caller starts a clock
 RATE_TOLERANCE = 1e-4  # of a frame rate
 SKINNING = {"method": "skinning"}  # provenance without a network
-QUASI_STATIC_FRAMES = 30  # frames for which a pose is held before its output counts as static
+QUASI_STATIC_FRAMES = 30  # for which a pose is held before its output counts as static
 
 
 def roll_out(

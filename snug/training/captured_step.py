@@ -20,7 +20,7 @@ from snug.training.device import CudaGraph
 from snug.training.divergence_guard import SETTLING
 from snug.training.optimisation_step import Trainer
 
-UNCAPTURED = 3  # first steps, in single operations: they compile, and make Adam's moments
+UNCAPTURED = 3  # first steps, which compile and make Adam's moments
 
 
 class CapturedTrainer(Trainer):

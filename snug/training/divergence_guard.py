@@ -36,7 +36,7 @@ class DivergenceGuard:
 
     def __init__(self, network: nn.Module, optimiser: optim.Optimizer, *, spike: float | None) -> None:
         self.network, self.optimiser, self.spike = network, optimiser, spike
-        self.rate = 1.0  # factor on the learning rate, halved by each return to good weights
+        self.rate = 1.0  # of the learning rate, halved by each return to good weights
         self.summary: dict[str, Any] = {
             "high_windows": 0, "skipped_updates": 0, "restored": 0, "named_windows": [],
         }  # fmt: skip

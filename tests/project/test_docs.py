@@ -40,7 +40,7 @@ SMALLER = {
     r"pins=\[0, 20\]": "pins=[0, 4]",
     "frames=60": "frames=3",
     r"^(python -m benchmarks\.(?:export|run full|score).*)$": r"\1 --set sizes.frames=14",
-    r'make_motion\("07_02"\)': r"\g<0>.cut(0, 14)",
+    r'make_motion\("dance_turn"\)': r"\g<0>.cut(0, 14)",
     "steps=4000": "steps=2",
     "--device cuda": "--device cpu --steps 2",
     '"reports/published': f'"{ROOT}/reports/published',

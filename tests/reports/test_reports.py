@@ -108,7 +108,7 @@ def test_a_broken_file_is_named_and_the_rest_goes_on(tmp_path, capsys):
     streams = capsys.readouterr()
     assert "tshirt-walk/snug.vtkhdf" in streams.err
     assert streams.out.splitlines()[-1] == str(run.report_path) and run.report_path.is_file()
-    assert streams.out.startswith("| Method ") and " SNUG has " in streams.out
+    assert streams.out.startswith("| Method ") and " SNUG's " in streams.out
 
 
 def test_curves_beside_a_trajectory_are_its_own(tmp_path):
