@@ -65,6 +65,11 @@ class Exported:
         ):
             c, face, weights = closest_point(point, body, faces, allowed)
             n = plane_normal(point, c, face, weights, body, faces, normals, of_vertices)
+            offset = point - c
+            if np.linalg.norm(offset) > 0.1 and n @ offset < 0.99 * np.linalg.norm(offset):
+                nearest = closest_point(point, body, faces, np.arange(len(faces)))[0]
+                if np.linalg.norm(point - nearest) > margin and winding_number(point, body, faces) == 0:
+                    n = offset / np.linalg.norm(offset)  # free cloth, far from the skin that it may touch
             total += stiffness * max(margin - n @ (point - c), 0.0) ** 3
         return total
 
@@ -125,6 +130,15 @@ def closest_point(point, body, faces, allowed):
     return places[kind, best], allowed[best], weights[kind, best]
 
 
+def winding_number(point, body, faces):
+    """Return how often the closed body winds around a point, by solid angles (van Oosterom 1983)."""
+    a, b, c = (body[faces] - point).swapaxes(0, 1)
+    la, lb, lc = (np.linalg.norm(side, axis=1) for side in (a, b, c))
+    volume = (a * np.cross(b, c)).sum(1)
+    cosines = la * lb * lc + (a * b).sum(1) * lc + (b * c).sum(1) * la + (c * a).sum(1) * lb
+    return round(np.arctan2(volume, cosines).sum() / (2 * np.pi))
+
+
 def plane_normal(point, c, face, weights, body, faces, normals, of_vertices):
     """Return the normal of a sample's contact plane, which goes through the closest point c."""
     smooth = weights @ of_vertices[faces[face]]
@@ -138,7 +152,7 @@ def plane_normal(point, c, face, weights, body, faces, normals, of_vertices):
         around = faces[np.isin(faces, corners).sum(1) == len(corners)]
         ways = body[around].reshape(-1, 3) - c
         tangential |= (ways @ offset > 1e-3 * np.linalg.norm(ways, axis=1)).any()
-    if tangential:  # a ball of 10 cm or more that touches the surface in c from below
+    if tangential:  # a ball of 10 cm or more that touches the surface in c from inside
         n = max(0.1, 1.5 * length) * smooth + length * offset
         return n / np.linalg.norm(n)
     if weights.min() > 0:

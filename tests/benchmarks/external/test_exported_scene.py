@@ -188,14 +188,16 @@ def exported(folder: Path):
 
 
 @pytest.mark.parametrize(
-    "name", ["simulation", *(pytest.param(name, marks=pytest.mark.slow) for name in ("skinning", "sunk"))]
+    "name",
+    ["simulation", *(pytest.param(n, marks=pytest.mark.slow) for n in ("skinning", "sunk", "behind"))],
 )
 def test_energies_and_curvature_follow_from_the_exported_files_alone(home, name):
     """In numpy, by the example of the documents, which shares nothing with the project's code."""
     folder, scene = home
     if name == "sunk":  # vertices of all depths, some of them below skin that they must not meet
-        positions = skinned_elsewhere(folder)
-        positions += np.random.default_rng(0).normal(0, 0.03, positions.shape)
+        positions = np.random.default_rng(0).normal(skinned_elsewhere(folder), 0.03)
+    elif name == "behind":  # free, more than 10 cm beyond the skin that it may touch
+        positions = skinned_elsewhere(folder) - [0.26, 0.1, 0.23]
     else:
         positions = prepared(name, scene).run().positions
     ours, files = energy_series(scene, [positions])[0], exported(folder)
