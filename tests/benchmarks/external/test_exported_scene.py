@@ -7,6 +7,7 @@ import json
 import os
 import subprocess
 import sys
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,8 @@ from reference_sim.files.mesh_files import read_mesh
 from snug.networks.dressed_body import DressedBody
 from tests.benchmarks.runner.tasks_by_hand import assets_of, dressed_scene, prepared
 from tests.snug.training.dressing import swaying, tube_dress
+
+SLOW = partial(pytest.param, marks=pytest.mark.slow)
 
 
 @pytest.fixture(scope="module")
