@@ -190,10 +190,7 @@ def exported(folder: Path):
     return names["Exported"](folder)
 
 
-@pytest.mark.parametrize(
-    "name",
-    ["simulation", *(pytest.param(n, marks=pytest.mark.slow) for n in ("skinning", "sunk", "behind"))],
-)
+@pytest.mark.parametrize("name", ["simulation", *map(SLOW, ("skinning", "sunk", "behind"))])
 def test_energies_and_curvature_follow_from_the_exported_files_alone(home, name):
     """In numpy, by the example of the documents, which shares nothing with the project's code."""
     folder, scene = home
