@@ -86,7 +86,7 @@ def verdict(run: Run, frame: pd.DataFrame) -> str:
         f"In {'a typical' if len(scenes) > 1 else 'one'} {_kind(run, scenes)}{motion} {run.label(name)}'s "
         f"excess energy over a converged simulation is {number(excess.typical, 2)} % of skinning's"
     )
-    text += f" ({number(excess.pooled, 2)} % summed over all motions)" if len(scenes) > 1 else ""
+    text += f" (geometric mean; ratio of sums {number(excess.pooled, 2)} %)" if len(scenes) > 1 else ""
     if times := _times_faster(run, name):
         text += f", and {run.label(name)} is more than {times} times faster than the simulation"
     if (correlation := value_of(frame, name, ALIKE)) is not None:

@@ -149,7 +149,7 @@ def front_sentences(run: Run) -> str:
     lines = (
         f"**{verdict(run, rows)}**\n",
         f"- Good at: low energy in little time. Supervised has {supervised} "
-        f"(against SNUG p {number(p_values[UNSEEN], 2)}, corrected), PBNS {pbns}; "
+        f"(paired p {number(p_values[UNSEEN], 2)}, Holm-corrected), PBNS {pbns}; "
         f"{run.label(SOLVER)}, has {stopped} ({interval or DASH}) and takes "
         f"{number(times[SOLVER] / times[NETWORK], 1)} times as long as SNUG.",
         "- Bad at: dynamics and unfamiliar motion. Its hem's correlation with the simulation's "
