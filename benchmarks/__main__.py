@@ -5,6 +5,7 @@ from __future__ import annotations
 import runpy
 import sys
 from collections.abc import Sequence
+from difflib import get_close_matches
 
 COMMANDS = {
     "run": ("benchmarks.run", "run a study: simulate, train, measure, report"),
@@ -26,10 +27,14 @@ COMMANDS = {
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command that the first word names; without one, list them. Return its exit status."""
     command = list(sys.argv[1:] if arguments is None else arguments)
-    if not command or command[0] not in COMMANDS:
+    if not command or command[0] in ("-h", "--help"):
         for name, (module, text) in COMMANDS.items():
             print(f"{name:<14} python -m {module:<23} {text}")
-        return 2 if command and command[0] not in ("-h", "--help") else 0
+        return 0
+    if command[0] not in COMMANDS:
+        names = get_close_matches(command[0], COMMANDS) or COMMANDS
+        print(f"benchmarks: no command '{command[0]}': choose from {', '.join(names)}", file=sys.stderr)
+        return 2
     module = COMMANDS[command[0]][0]
     sys.argv = [f"python -m {module}", *command[1:]]
     runpy.run_module(module, run_name="__main__", alter_sys=True)

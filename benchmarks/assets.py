@@ -36,7 +36,7 @@ class Read:
 
     @cached_property
     def digest(self) -> str:
-        """Digest of what was read, for a garment that of the body too that wears it."""
+        """Digest of what was read."""
         return digest(self.content)
 
 

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.assets import Assets, make_motions, open_assets
+from benchmarks.assets import Assets
 from benchmarks.external.roll_out_files import MODULE
 from benchmarks.metric import RollOut
 from benchmarks.metrics.energy import copy_terms
@@ -27,6 +27,7 @@ from benchmarks.provenance import digest_of_file
 from benchmarks.references import TRAINED, Reference, find_in_package, find_reference, load_garment
 from benchmarks.results.run_folder import RunFolder, model_path
 from benchmarks.runner.cells import prepare_method, run_cell
+from benchmarks.runner.execute_plan import held
 from benchmarks.runner.ground_truth import simulate_quasi_static
 from benchmarks.runner.measurements import measure_cell, roll_outs_of
 from benchmarks.runner.rows import rows_of
@@ -42,11 +43,11 @@ OLDER = "SNUG or PBNS is of an earlier network of the package; benchmarks.publis
 
 
 def evaluate(plan: Plan, references: Mapping[str, Reference] | None = None) -> RunLog:
-    """Run and measure the cells of a plan, and write run.json and results.csv into its folder.
+    """Run and measure the cells of a plan; write run.json and results.csv into its folder.
 
     Args:
         plan: cells of SNUG and PBNS count only in scenes with a reference: they are the package's.
-        references: scene -> what takes the place of its simulation; None: those shipped.
+        references: scene -> what replaces its simulation; None: those shipped.
 
     Raises:
         RollOutFileError: a roll-out that does not belong to its scene; then nothing is written.
@@ -74,26 +75,21 @@ def evaluate(plan: Plan, references: Mapping[str, Reference] | None = None) -> R
         if cell.entry.module == MODULE:
             prepare_method(cell, contexts[cell.scene.name])
     print(*dict.fromkeys(notes), sep="\n", end="\n" * bool(notes), file=sys.stderr)
-    log, outcomes = RunLog(plan), dict[TaskId, Outcome]()
-    if assets:
-        log.open_assets(assets)
-    for scene in plan.scenes:
-        outcomes |= _run_scene(scene, plan, contexts[scene.name], by_scene.get(scene.name))
-    log.config["finished"] = now()
-    outcomes = {id: replace(o, origin=log.origin | o.origin) for id, o in outcomes.items()}
-    log.write_rows(rows_of(plan, (), outcomes))
+    with held(plan.folder):
+        log, outcomes = RunLog(plan), dict[TaskId, Outcome]()
+        if assets:
+            log.open_assets(assets)
+        for scene in plan.scenes:
+            outcomes |= _run_scene(scene, plan, contexts[scene.name], by_scene.get(scene.name))
+        log.config["finished"] = now()
+        outcomes = {id: replace(o, origin=log.origin | o.origin) for id, o in outcomes.items()}
+        log.write_rows(rows_of(plan, (), outcomes))
     return log
 
 
 def assets_of(plan: Plan) -> Assets | None:
-    """Open body, garments and the motions of the scenes alone; None without a dressed scene."""
-    user_motions = plan.inputs.motions
-    names = dict.fromkeys(scene.motion for scene in plan.scenes if scene.dressed)
-    motions = [user_motions[name] if name in user_motions else make_motions([name])[0] for name in names]
-    if not names:
-        return None
-    sizes, ready = plan.study.sizes, load_garment(plan)
-    return open_assets(sizes, motions, plan.garments, inputs=plan.inputs, ready=ready)
+    """Make body, garments and motions of the scenes alone; None without a dressed one."""
+    return plan.open_some(ready=load_garment(plan)) if plan.garments else None
 
 
 def _run_scene(
@@ -163,7 +159,7 @@ def _save(reference: Reference, cell: Cell, context: Context) -> Outcome:
 
 @contextmanager
 def _steps_beside(roll_out: RollOut) -> Iterator[None]:
-    """Solve a roll-out's time steps again in another process, while this one measures the rest."""
+    """Solve time steps again in another process, while this one measures the rest."""
     if "speed" not in roll_out.suites or sys.platform != "linux":
         yield
         return
@@ -184,7 +180,7 @@ def _recall_steps() -> Any:
 
 def _recall_scale() -> Any:
     roll_out = _remembered[0]
-    # It compiles the minimiser while the other process compiles the search for contact planes.
+    # It compiles the minimiser while the other process compiles the search for contact.
     if {term.name for term in roll_out.scene.energies} <= WITHOUT_STEP:
         unprepared = Potential(copy_terms(roll_out.scene))
         unprepared.hessian(roll_out.positions[0])

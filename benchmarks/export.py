@@ -56,6 +56,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         if folder.is_dir():
             raise StudyError(f"{folder}: is a folder; name a file, as motions.h5")
+        if options.reference or options.reader:
+            raise StudyError("--reference and --for are of a scene: leave them out for training motions")
         motions = write_training_motions(garment, options, folder)
         print(f"{len(motions)} training motions of {garment} in {folder}")
         return 0

@@ -7,6 +7,7 @@ benchmarks.methods.declared_networks, a method from outside brings its own. Impo
 from __future__ import annotations
 
 import importlib.util
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -46,8 +47,7 @@ class Training:
         kind: one of snug.kinds.KINDS.
         recipe: options of network and training.
         simulated: simulations that it learns from; None if it learns from the energies alone.
-        packaged: name of the network taken from the package in place of this training; empty: it
-            is trained.
+        packaged: network taken from the package in place of this training; empty: it is trained.
     """
 
     kind: str
@@ -56,7 +56,7 @@ class Training:
     packaged: str = field(default="", metadata={"added": True})
 
     def at(self, preset: Preset) -> Training:
-        """Return the training with no more simulated augmented frames than a preset has, and its turns."""
+        """Return the training with at most the augmented frames of a preset, and its turns."""
         simulated, recipe = self.simulated, replace(self.recipe, turn=preset.turns * self.recipe.turn)
         if simulated:
             simulated = replace(simulated, mixed=min(simulated.mixed, preset.simulated_mixed))
@@ -82,14 +82,13 @@ class Method:
     """
 
     def prepare(self, scene: BuiltScene) -> None:
-        """Load, compile and warm up for a scene: all that a user pays once. Not timed."""
+        """Load, compile and warm up for a scene: paid once, not timed."""
         raise NotImplementedError
 
     def run(self) -> Trajectory:
         """Compute the roll-out, frame by frame. Timed. Failure is a status in it, not an exception.
 
-        Short ones are called again until enough time is measured: each does all the work, from the
-        start.
+        Short ones are called again until enough time is measured: each does all the work anew.
         """
         raise NotImplementedError
 
@@ -102,7 +101,7 @@ class Method:
         return None if scene.dressed is None else posed_body(scene.dressed)
 
     def quasi_static(self) -> Trajectory | None:
-        """Return the method's own quasi-static solution of each frame, None where it has none. Not timed."""
+        """Return the method's quasi-static solution of each frame, or None. Not timed."""
         return None
 
     def batch(self, copies: int) -> Callable[[], np.ndarray]:
@@ -114,7 +113,7 @@ class Method:
 
 
 def posed_body(dressed: Dressed) -> Callable[[int], tuple[np.ndarray, np.ndarray]]:
-    """Return a function of the frame: vertices (B, 3) of the posed body, the garment's pins (P, 3) [m]."""
+    """Return a function of the frame: vertices (B, 3) of the posed body, pins (P, 3) [m]."""
     body, motion, garment = dressed.body, dressed.motion, dressed.garment
     pose = body.poser(dressed.betas)
 
@@ -135,13 +134,10 @@ class MethodEntry:
         label: its name for people.
         module: has `make(*, models, seed, **options)`, which returns a Method, or says another function
             behind a colon; by default the file that declares the entry.
-        declared_in: that file, or module of an installed package; empty for the project's own. Filled in
-            where it is read.
-        files: what it reads, such as weights, as paths relative to that file; a change makes its results
-            stale.
+        declared_in: that file, or installed module, filled in by its reader; empty for the project's own.
+        files: what it reads, as weights: paths relative to that file; a change makes its results stale.
         options: what make() gets besides models and seed.
-        needs_body: whether it works on dressed bodies alone: `scene.dressed` has body, garment and
-            motion.
+        needs_body: whether it works on dressed bodies alone: `scene.dressed` has garment and motion too.
         trained: name of the network that it needs, if any.
         training: how that is trained, where benchmarks.methods.declared_networks does not have it.
         seeded: whether another seed gives another answer; if not, it runs once whatever the seeds.
@@ -149,20 +145,17 @@ class MethodEntry:
         truncated: whether it stops before the minimum on purpose, after a number of iterations.
         needs_no_obstacle: whether it knows no contact.
         package: what it needs installed besides this project.
-        batched: whether it has `batch(copies)`, which computes many bodies at once.
-        gives_first_frame: whether it computes frame 0 too, as networks do; other methods are given the
-            start.
+        batched: whether it has `batch(copies)`, many bodies at once; scenes with `networks_only` are met
+            by such methods alone.
+        gives_first_frame: whether it computes frame 0 too, as networks do; others are given the start.
         timed: whether its run time is measured in scenes that measure run times.
         declared_ms: [ms] a frame, as its author says, where no clock of ours can measure it.
-        other_mesh: whether its vertices and triangles are not the scene's: then only surfaces are
-            compared.
-        static_known: False of a solver whose quasi-static solution is not the simulation's, and that does
-            not return it either.
+        other_mesh: whether its mesh is not the scene's: then only surfaces are compared.
+        static_known: False of a solver of another quasi-static solution that does not return it.
         left_out: reason why it is not run; empty where it runs.
         role: its place in tables and plots: `solver`, `warm-started`, `network`, `ablation`, `baseline`,
             `external`, or another of benchmarks.results.row.ROLES.
-        family: methods of one curve of a report, which differ in effort alone; the method's own name
-            where it is empty.
+        family: methods of one curve of a report, which differ in effort alone; empty: the method's name.
         level: place on that curve, as a number of iterations or a tolerance.
         base: name of the method that reports compare this one with.
         pairing_group: shared by methods compared seed by seed.
@@ -203,9 +196,11 @@ class MethodEntry:
         if self.role not in ROLES:
             roles = ", ".join(filter(None, ROLES))
             raise DeclarationError(f"method {self.name}: unknown role '{self.role}'; use one of {roles}")
+        if self.declared_ms is not None and not 0.0 < self.declared_ms < math.inf:
+            raise DeclarationError(f"method {self.name}: declared_ms={self.declared_ms}: give it above 0")
 
     def is_meant_for(self, scene: Scene) -> bool:
-        """Return whether method and scene may meet: some scenes are for networks alone, some for none."""
+        """Return whether method and scene may meet: some are for batched ones alone."""
         if scene.networks_only:
             return self.batched
         return not (scene.own_garment and self.trained)
@@ -231,5 +226,5 @@ class MethodEntry:
 
 def is_installed(package: str) -> bool:
     """Return whether a package can be imported; a mere folder of that name cannot."""
-    spec = importlib.util.find_spec(package)
+    spec = importlib.util.find_spec(package.partition(".")[0])
     return spec is not None and spec.origin is not None

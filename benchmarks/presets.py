@@ -25,6 +25,7 @@ class Dependence:
 class Preset:
     """The sizes of one run. `None` for a number of motions means all of them.
 
+    garment_vertices: about so many has a tailored garment.
     frames: at most so many frames of each motion that is measured, at 30 per second, and train_frames of
     each that trains; clip_frames: of its liveliest part;
     warm_up_frames: at the beginning of a dressed scene, simulated and not evaluated, before those of a
@@ -32,7 +33,7 @@ class Preset:
     steps: optimiser steps per kind of network, or per training. simulated_mixed: most augmented frames
     that are simulated for each original one; turns: share of a recipe's turns in augmented frames.
     settle_frames: frames from the T-pose into the first pose of a motion. sheet_cells: the small scenes
-    are sheets of so many cells along each side.
+    are sheets of so many cells along each side, and have sheet_frames frames.
     gap_samples: frames of a trajectory, at least, at which part speed solves the step again to know the
     gap to its minimum. least_seconds [s]: of run time to be measured of each timed cell, whose short run
     is done again until then. repeats: times that a cell of part speed is run, those whose first run took

@@ -15,6 +15,7 @@ import json
 import os
 import platform
 import subprocess
+import zlib
 from contextlib import suppress
 from functools import cache
 from importlib import metadata
@@ -30,27 +31,27 @@ PACKAGES = (  # those that compute, or read what is computed with
 )  # fmt: skip
 
 
-# What numbers are computed by; networks, references and studies name themselves by digest or in run.json.
-CODE = ("reference_sim", "snug", "benchmarks", ":!benchmarks/studies", ":!benchmarks/reference_data",
-        ":!*.safetensors", ":!*.md")  # fmt: skip
+# What numbers are computed by; networks, references and study.toml name themselves in run.json.
+CODE = ("reference_sim", "snug", "benchmarks", "studies/*.py", ":!studies/*/test_*.py",
+        ":!benchmarks/studies", ":!benchmarks/reference_data", ":!*.safetensors", ":!*.md")  # fmt: skip
 
 
 @cache  # the first call is nearest to the code that was loaded
 def commit() -> str:
-    """Return the last commit that changed CODE, "+changes" where its files differ; else the package version.
+    """Return the last commit that changed CODE, "+changes" if files differ; else the version.
 
     So all runs between two changes of the code name one commit, whatever is committed besides.
     """
 
     def git(*options: str) -> str:
-        # No lock on the index: one would stay there where the disk is full.
+        # No lock on the index: one would stay where the disk is full.
         command = ["git", "--no-optional-locks", "-C", str(ROOT), *options, "--", *CODE]
         return subprocess.run(command, capture_output=True, text=True, timeout=20, check=True).stdout
 
     # No git here: the installed version is what is known.
     with suppress(OSError, subprocess.SubprocessError):
         if (ROOT / ".git").exists():
-            changes = git("status", "--porcelain", "--untracked-files=no")
+            changes = git("status", "--porcelain", "--untracked-files=normal")
             return git("log", "-1", "--format=%h", "--abbrev=10").strip() + "+changes" * bool(changes)
     return f"version {package_version('neural-garment-benchmark')}"
 
@@ -64,10 +65,9 @@ def package_version(name: str) -> str:
 
 
 def processor_name() -> str:
-    """Return the processor's name, family, model and stepping, or the architecture where it has no name.
+    """Return the processor's name, family, model and stepping, or else the architecture.
 
-    Clouds give processors of several generations one name, which run times and last bits are not the same
-    of.
+    Clouds sell several generations under one name; they differ in run times and last bits.
     """
     facts: dict[str, str] = {}
     with suppress(OSError):  # not Linux
@@ -75,9 +75,8 @@ def processor_name() -> str:
         lines = (line.partition(":") for line in first.splitlines())
         facts = {name.strip(): " ".join(value.split()) for name, _, value in lines}
     name = facts.get("model name") or platform.processor() or platform.machine()
-    details = [
-        f"{key.split()[-1]} {facts[key]}" for key in ("cpu family", "model", "stepping") if key in facts
-    ]
+    keys = [key for key in ("cpu family", "model", "stepping") if key in facts]
+    details = [f"{key.split()[-1]} {facts[key]}" for key in keys]
     return f"{name} ({', '.join(details)})" if details else name
 
 
@@ -117,7 +116,7 @@ def versions() -> dict[str, str]:
 
 
 def digest(value: Any) -> str:
-    """Return 16 hexadecimal digits of a value: JSON, bytes, arrays, sets and dataclasses of these.
+    """Return 16 hexadecimal digits of a value: JSON, bytes, arrays, sets, dataclasses.
 
     >>> digest({"b": 1, "a": [2]}) == digest({"a": [2], "b": 1})
     True
@@ -142,12 +141,14 @@ def _plain(value: Any) -> Any:
 
 
 def digest_of_file(path: Path) -> str:
-    """Return 16 hexadecimal digits of a file's bytes, of a .gz file of what it holds. Raises OSError."""
-    with gzip.open(path) if path.suffix == ".gz" else path.open("rb") as stream:
+    """Return 16 hexadecimal digits of a file's bytes, of a whole .gz of what it holds. Raises OSError."""
+    damaged = suppress(EOFError, zlib.error, gzip.BadGzipFile)
+    with damaged, gzip.open(path) if path.suffix == ".gz" else path.open("rb") as stream:
         return hashlib.file_digest(stream, "sha256").hexdigest()[:16]
+    return digest(path.read_bytes())
 
 
-# Prose, compiled kernels; and trained networks: a task that reads one names its digest.
+# Prose, compiled kernels, trained networks: a task that reads one names its digest.
 NO_PART = (".pyc", ".md", ".nbi", ".nbc", ".safetensors")
 
 
@@ -155,9 +156,8 @@ def software(*places: str) -> dict[str, str]:
     """Return place -> digest of its files, and package -> version or "absent".
 
     Args:
-        *places: folders and files of the project, as `snug/body`, and absolute paths of users' files. A
-            place within another one is no part of its own. With a user's file everything that is
-            installed counts.
+        *places: folders and files of the project, as `snug/body`, and absolute paths of users' files. One
+            within another is no part of its own. With a user's file all that is installed counts.
 
     Raises:
         DeclarationError: a place that is not there, or a file that cannot be read.
@@ -194,7 +194,7 @@ def find_module(module: str) -> str:
 
 
 def find_imports(home: str) -> dict[str, Path]:
-    """Return name -> file of modules and packages beside a user's file that it or they import."""
+    """Return name -> file of modules beside a user's file that it or they import."""
     top, names = _top_of(Path(home)), set[str]()
     for path in _neighbours(Path(home)):
         with suppress(SyntaxError, ValueError):  # it is not imported: what is was loaded
@@ -209,7 +209,7 @@ def find_imports(home: str) -> dict[str, Path]:
 
 @cache
 def _content(place: str) -> str:
-    """Return the digest of the files of a place, a folder of the project or a user's file."""
+    """Return the digest of a place, a folder of the project or a user's file."""
     if Path(place).is_absolute():
         top, paths = _top_of(Path(place)), _neighbours(Path(place))
     else:
@@ -227,8 +227,7 @@ def files_of(place: str) -> list[Path]:
     path = ROOT / place
 
     def counts(file: Path) -> bool:
-        name = file.relative_to(ROOT)
-        hidden = any(part.startswith((".", "__pycache__")) for part in name.parts)
+        hidden = any(part.startswith((".", "__pycache__")) for part in file.relative_to(ROOT).parts)
         return file.suffix not in NO_PART and not hidden
 
     files = [path] if path.is_file() else sorted(p for p in path.rglob("*") if p.is_file())
@@ -236,7 +235,7 @@ def files_of(place: str) -> list[Path]:
 
 
 def _neighbours(home: Path) -> list[Path]:
-    """Return the modules beside a user's file or its package, and those of folders of modules there.
+    """Return the modules beside a user's file or its package, and in folders there.
 
     Of an installed package they are its own: what is installed beside it counts by its version.
     """

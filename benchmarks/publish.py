@@ -11,12 +11,11 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from benchmarks.plan.cell import flat
 from benchmarks.plan.plan import make_plan
 from benchmarks.plan.study import Show, Study, StudyError, option, read_study, study_names
 from benchmarks.provenance import commit, digest_of_file
 from benchmarks.results.row import USABLE, ResultsError
-from benchmarks.results.run_folder import RunFolder, model_path
+from benchmarks.results.run_folder import RunFolder, flat, model_path
 from benchmarks.runner.execute_plan import describe, is_accepted
 from benchmarks.timing import one_thread
 from reference_sim.command_line import Parser, command
@@ -30,9 +29,9 @@ REFERENCES = "references"  # in place of a study
 KEPT = ("run.json", "report.pdf")
 PACKED = ("results.csv", "frame_energies.csv")  # kept as .csv.gz, which pandas reads as they are
 EXAMPLES = """examples:
-  python -m benchmarks.publish shapes                one of them
-  python -m benchmarks.publish                       all of them
-  python -m benchmarks.publish references            what benchmarks.score takes in place of a simulation
+  python -m benchmarks.publish shapes        one of them
+  python -m benchmarks.publish               all of them
+  python -m benchmarks.publish references    what benchmarks.score takes in place of a simulation
 
 A study that is published by the present code is left: in several sittings the same command does one after
   another, each to be committed as it comes. Each run goes on where it was stopped, in a folder of its own
@@ -48,7 +47,7 @@ exit status: 0 all are published; 1 a run failed and is left as it was; 2 the re
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status.
 
-    Says first what is published of the code as it is, and how long each other study may take.
+    Says first what is published of this code, and how long each other study may take.
     """
     one_thread()
     parser = Parser(
@@ -58,13 +57,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     )
     add = parser.add_argument
     add("studies", nargs="*", metavar="STUDY", help="names of studies (default: all that have [show])")
-    add(
-        "-o", "--out", metavar="DIR", default=WORK, type=Path, help=f"where the runs lie (default {WORK})"
-    )
+    add("-o", "--out", metavar="DIR", default=WORK, type=Path, help=f"where runs lie (default {WORK})")
     options = parser.parse_args(arguments)
     studies = [name for name in study_names() if read_study(name).show]
     head = commit()
     failed = 0
+    if head.endswith("+changes"):
+        raise StudyError(f"{head}: commit the changes first, so that a commit says what was run")
     if options.studies == [REFERENCES]:
         from benchmarks.references import VERTICES, write_garment
         from snug import Body, find_template  # loads libraries of meshes
@@ -76,12 +75,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     names = options.studies or studies
     if unshown := [name for name in names if not read_study(name).show]:
         raise StudyError(f"study {unshown[0]}: has no [show]: the studies {', '.join(studies)} do")
-    if head.endswith("+changes"):
-        raise StudyError(f"{head}: commit the changes first, so that a commit says what was run")
     plans = {name: make_plan(with_seeds(name), folder=options.out / Path(name).stem) for name in names}
-    unpublished = [
-        name for name in names if not is_published(TARGET / Path(name).stem, plans[name].study, head)
-    ]
+    unpublished = [n for n in names if not is_published(TARGET / Path(n).stem, plans[n].study, head)]
     for name in names:
         state = describe(plans[name]).rpartition("\n")[2] if name in unpublished else "is published"
         print(f"{name}: {state}", file=sys.stderr, flush=True)
@@ -122,22 +117,19 @@ def make_reference(name: str, out: Path) -> Path:
     for row in log.rows:
         if row.value is not None:
             metrics[row.method][row.metric] = row.value
-    networks = {
-        method: digest_of_file(references.find_in_package(method)) for method in references.TRAINED
-    }
+    networks = {name: digest_of_file(references.find_in_package(name)) for name in references.TRAINED}
     reference = replace(reference, metrics=metrics, origin=log.origin, networks=networks)
     return references.write_reference(scene, plan, reference, built)
 
 
 def with_seeds(name: str) -> Study:
     """Return a study with the seeds published of it."""
-    study = read_study(name)
-    seeds = study.show.seeds if study.show else ()
-    return read_study(name, [option("seeds", [*seeds])]) if seeds else study
+    show = read_study(name).show
+    return read_study(name, [option("seeds", [*show.seeds])] if show and show.seeds else [])
 
 
 def is_published(target: Path, study: Study, head: str) -> bool:
-    """Return whether a folder has what is published of a study as it is, computed by commit `head`."""
+    """Return whether a folder has a study as it is, computed by commit `head`."""
     if not (target / "run.json").is_file():
         return False
     config = RunFolder(target).read_config()
@@ -145,14 +137,13 @@ def is_published(target: Path, study: Study, head: str) -> bool:
 
 
 def publish(name: str, out: Path, into: Path, head: str) -> None:
-    """Run the study of that name or path below `out`, or go on with it; keep below `into` what is published.
+    """Run a study, by name or path, below `out`, or go on; keep what is published below `into`.
 
-    Raises ResultsError where the run failed, has rows of another commit than `head`, or lacks a picture
-    that the documents show.
+    Raises ResultsError where the run failed, has rows of another commit, or lacks a picture.
     """
     show, source = read_study(name).show, out / Path(name).stem
     assert show is not None
-    seeds = ["--seeds", ",".join(map(str, show.seeds))] if show.seeds else []  # see with_seeds
+    seeds = ["--seeds", ",".join(map(str, show.seeds))] if show.seeds else []
     # Again what has failed, as a task that lacked memory once.
     _call("benchmarks.run", name, *seeds, "--retry", "-o", str(source))
     if not all_usable(RunFolder(source)):
@@ -174,9 +165,9 @@ def _call(*command: str) -> None:
 
 
 def all_usable(folder: RunFolder) -> bool:
-    """Return whether a run has ended and all its numbers count, those of stalled simulations too.
+    """Return whether a run has ended and all its numbers count, also of stalled simulations.
 
-    `benchmarks.run` ends with status 1 where a simulation has stalled. Extreme cases may end as they do.
+    `benchmarks.run` ends with status 1 where a simulation stalled. Extreme cases may end as they do.
     """
     if not folder.rows_path.is_file():
         return False

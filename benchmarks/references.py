@@ -87,7 +87,8 @@ def write_garment(garment: Garment) -> None:
     names = ("rest_positions", "faces", "body_vertices", "skinning_weights")
     arrays: dict[str, Any] = {name: getattr(garment, name) for name in names}
     loops = {f"{LOOP}{name}": loop for name, loop in garment.loops.items()}
-    np.savez_compressed(GARMENT, **arrays | loops)
+    with replacing(GARMENT) as temporary:
+        np.savez_compressed(temporary, **arrays | loops)
 
 
 def key_of(scene: Scene, plan: Plan, built: BuiltScene) -> str:

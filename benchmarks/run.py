@@ -18,8 +18,13 @@ from benchmarks.plan.plan import Plan, make_plan
 from benchmarks.plan.study import StudyError, locate
 from benchmarks.runner.task import RunRefused, RunStopped
 from benchmarks.timing import one_thread
+from reference_sim.command_line import announce_compilation, command
+from reference_sim.files.atomic_files import disk_full
+
+GOES_ON = "the same command goes on from there"
 
 
+@command(PROGRAM, goes_on=GOES_ON, bad_input=(RunRefused, DeclarationError, RollOutFileError))
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
     typed = list(sys.argv[1:] if arguments is None else arguments)
@@ -41,19 +46,17 @@ def main(arguments: Sequence[str] | None = None) -> int:
             scheduler=options.scheduler or "",
             command=shlex.join(["python", "-m", PROGRAM, *typed]),
         )
-    except (ValueError, OSError) as error:  # also the readers' own: each is one line with file and remedy
-        line = " ".join(str(error).split())
-        line = locate(line, name, typed) if isinstance(error, StudyError) else line
-        print(f"{PROGRAM}: {line}", file=sys.stderr)
-        return 2
-    except KeyboardInterrupt:
-        print(f"{PROGRAM}: interrupted; nothing was written", file=sys.stderr)
-        return 130
+    except ValueError as error:  # also the readers' own: each is one line with file and remedy
+        line = locate(str(error), name, typed) if isinstance(error, StudyError) else str(error)
+        raise RunRefused(line) from error
     return carry_out(plan, dry_run=options.dry_run)
 
 
 def carry_out(plan: Plan, *, dry_run: bool = False) -> int:
-    """Run the plan, or print what would be run; return the exit status."""
+    """Run the plan, or print what would be run; return the exit status.
+
+    Raises RunRefused, DeclarationError and RollOutFileError before anything is run.
+    """
     for motion in plan.inputs.motions.values():
         print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
     if absent := plan.study.motion_files.absent(plan.inputs.motions):
@@ -62,38 +65,26 @@ def carry_out(plan: Plan, *, dry_run: bool = False) -> int:
         print(f"motion {name}: {text} are measured; --set sizes.frames=N measures more", file=sys.stderr)
     from benchmarks.runner.execute_plan import check_methods, describe, execute, held
 
+    if dry_run:
+        print(describe(plan))
+        return 0
+    from benchmarks.runner.isolated_process import LOADED_BY_DRESSED, start_loading
+
+    if plan.scheduler:
+        from benchmarks.runner.cluster import check_scheduler  # loads dask
+
+        check_scheduler(plan.scheduler)
+    announce_compilation()
+    dressed = bool(plan.scenes) and all(scene.dressed for scene in plan.scenes)
+    start_loading(*(LOADED_BY_DRESSED if dressed else ()))
+    assets = check_methods(plan)
     try:
-        if dry_run:
-            print(describe(plan))
-            return 0
-        from benchmarks.runner.isolated_process import LOADED_BY_DRESSED, start_loading
-        from reference_sim.command_line import announce_compilation
-
-        if plan.scheduler:
-            from benchmarks.runner.cluster import check_scheduler  # loads dask
-
-            check_scheduler(plan.scheduler)
-        announce_compilation()
-        dressed = bool(plan.scenes) and all(scene.dressed for scene in plan.scenes)
-        start_loading(*(LOADED_BY_DRESSED if dressed else ()))
-        assets = check_methods(plan)
         with held(plan.folder):
             print(plan.study.question, file=sys.stderr)
             return execute(plan, assets)
-    except (RunRefused, DeclarationError, RollOutFileError) as error:
-        print(f"{PROGRAM}: {error}", file=sys.stderr)
-        return 2
     except (RunStopped, OSError) as error:
-        from reference_sim.files.atomic_files import disk_full
-
-        line = str(error) if isinstance(error, RunStopped) or error.filename else ""
-        if not (line := disk_full(error) or line):
-            raise
-        print(f"{PROGRAM}: {line}; the same command goes on from there", file=sys.stderr)
+        print(f"{PROGRAM}: {disk_full(error) or error}; {GOES_ON}", file=sys.stderr)
         return 1
-    except KeyboardInterrupt:
-        print(f"{PROGRAM}: interrupted; what was finished lies whole in {plan.folder}", file=sys.stderr)
-        return 130
 
 
 if __name__ == "__main__":

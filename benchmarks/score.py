@@ -17,6 +17,7 @@ from benchmarks.plan.cell import Cell
 from benchmarks.plan.options import add_options, study_of
 from benchmarks.plan.plan import Plan, make_plan
 from benchmarks.plan.study import Study, StudyError, option, read_study
+from benchmarks.results.run_folder import RunFolder
 from benchmarks.timing import one_thread
 from reference_sim.command_line import Parser, command
 
@@ -31,8 +32,8 @@ NO_REFERENCE = (
     "left out by --no-reference: distances of curvature and position, dynamics, relative energy gap"
 )
 EXAMPLES = """examples:
-  python -m benchmarks.export tshirt/kick -o kick                 the scene, to be simulated elsewhere
-  python -m benchmarks.score mine.npz --scene tshirt/07_02            seconds: its reference is shipped
+  python -m benchmarks.export tshirt/kick -o kick         the scene, to be simulated elsewhere
+  python -m benchmarks.score mine.npz --scene tshirt/07_02    seconds: its reference is shipped
   python -m benchmarks.score mine.npz --scene tshirt/kick -o scored   minutes: the scene is simulated
   python -m benchmarks.score mine.pc2,units=cm,up=z --scene tshirt/kick
   python -m benchmarks.score theirs=frames/,ms=2.2 --scene hanging_sheet
@@ -149,6 +150,9 @@ def plan_score(
         replace(study, parts=parts, scenes=(scene,), methods=methods, rollouts={name: stored}),
         folder=folder, command=command_line, scenes=scenes,
     )  # fmt: skip
+    run = RunFolder(plan.folder)
+    if run.config_path.is_file() and PROGRAM not in str(run.read_config().get("command")):
+        raise StudyError(f"--out {run.path}: holds a run of another command; name another folder")
     if len(plan.scenes) != 1:
         raise StudyError(f"{scene}: name one scene; see python -m benchmarks.run --list")
     cells = []
@@ -159,7 +163,7 @@ def plan_score(
 
 
 def _reference(cell: Cell, source: str | Path | Literal[False] | None) -> Cell:
-    """Return the simulation's cell, or the one that takes its place; others as they are."""
+    """Return the simulation's cell, or the one in its place; others as they are."""
     if cell.entry.role != "reference" or source is None:
         return cell
     if source is False:
@@ -174,7 +178,7 @@ def _reference(cell: Cell, source: str | Path | Literal[False] | None) -> Cell:
 
 
 def numbers(log: RunLog) -> dict[str, Any]:
-    """Return name, scene, status ("ok", or the first other one), reason, metrics and folder of the roll-out.
+    """Return name, scene, status ("ok", or the first other one), reason, metrics and folder.
 
     Metrics are name -> value and unit.
     """

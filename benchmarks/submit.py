@@ -1,8 +1,7 @@
 """python -m benchmarks.submit: check an entry of another author, and score it from its vertices.
 
 An entry is a folder of the method's name: entry.toml, and roll-outs or a program that makes them. Its
-scores are a run's rows without clock and machine; they lie in `scores` with the digests of all that was
-scored.
+scores are rows of a run without clock and machine; they lie in `scores` with digests of what was scored.
 """
 
 from __future__ import annotations
@@ -19,14 +18,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from benchmarks.external.roll_out_files import PLACE, RollOutOption, read_roll_out
-from benchmarks.plan.cell import flat
 from benchmarks.plan.plan import Plan, make_plan
 from benchmarks.plan.study import StudyError, read_fields, read_study
 from benchmarks.presets import find_preset
 from benchmarks.provenance import digest, digest_of_file
 from benchmarks.results.protocol import DIGEST, NUMBER
 from benchmarks.results.row import USABLE
-from benchmarks.results.run_folder import RunFolder
+from benchmarks.results.run_folder import RunFolder, flat
 from benchmarks.score import MEASURED_BESIDE
 from benchmarks.timing import one_thread
 from reference_sim.command_line import Parser, command
@@ -47,10 +45,10 @@ PICTURE = "picture.png"
 SAMPLED, VERTICES = "sampled.npz", 20  # so many vertices of each roll-out: by them copies are found
 COPIED, SAME = 0.9, 1e-4  # of a copy: share of frames, and their rms distance [m]
 EXAMPLES = """examples:
-  python -m benchmarks.export tshirt/dance_turn -o dance            a scene, to be dressed elsewhere
-  python -m benchmarks.submit check submissions/mine                seconds: metadata, files, protocol
-  python -m benchmarks.submit score submissions/mine                a minute: writes submissions/mine/scores
-  python -m reports.docs                                            writes the page of all entries
+  python -m benchmarks.export tshirt/dance_turn -o dance     a scene, to be dressed elsewhere
+  python -m benchmarks.submit check submissions/mine         seconds: metadata, files, protocol
+  python -m benchmarks.submit score submissions/mine         a minute: writes submissions/mine/scores
+  python -m reports.docs                                     writes the page of all entries
 
 DIR has entry.toml and one roll-out for each scene, or a program (docs/entries.md). Both check and score load
   the program, and score runs it: read the program of somebody else first.
@@ -65,7 +63,7 @@ class Metadata:
     authors: str
     description: str  # one sentence
     url: str  # of code or report, or where in this repository
-    training_data: str  # what the method has learned from; "none"
+    training_data: str  # what the method learned from; "none"
     hardware: str  # of the declared time
     protocol: str  # number of the one that the roll-outs were made by
     milliseconds: float  # a frame, as the authors declare them
@@ -86,13 +84,14 @@ class Metadata:
                 "give either roll_outs = 'roll-outs/{scene}.npz' or program = 'method.py'"),
             (source, not path.is_absolute() and ".." not in path.parts,
                 "lies outside of the entry's folder: put it there"),
+            ("seeds", not self.roll_outs or len(self.seeds) == 1, "give one where roll-outs are files"),
             ("scenes", set(self.scenes) <= set(SCENES), f"choose from {', '.join(SCENES)}"),
             *((name, len(set(values)) == len(values), "give each once")
                 for name, values in (("scenes", self.scenes), ("seeds", self.seeds))),
         )  # fmt: skip
         for name, fine, otherwise in demands:
             if not fine:
-                raise ValueError(f"{name} = {getattr(self, name)!r}: {otherwise}")
+                raise ValueError(f"{name}: {getattr(self, name)!r}: {otherwise}")
 
 
 @dataclass(frozen=True)
@@ -118,7 +117,7 @@ class Entry:
         return RunFolder(self.path / "scores")
 
     def digests(self) -> dict[str, str]:
-        """Return file -> digest of all that is scored and of the scores, but for run.json, which has them."""
+        """Return file -> digest of all that is scored and of the scores, but for run.json."""
         return {
             path.relative_to(self.path).as_posix(): digest_of_file(path)
             for path in sorted(self.path.rglob("*"))
@@ -126,7 +125,7 @@ class Entry:
         }
 
     def plan(self, folder: Path) -> Plan:
-        """Return the plan that scores the entry: beside the simulation and skinning, without a clock."""
+        """Return the plan that scores the entry beside simulation and skinning, untimed."""
         metadata = self.metadata
         option = RollOutOption(self.name, str(self.path / metadata.roll_outs), ms=metadata.milliseconds)
         programs = (str(self.path / metadata.program),) if metadata.program else ()
@@ -173,9 +172,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
             check_methods(plan)
             if path := entry.metadata.roll_outs:
                 files = {name: entry.path / path.replace(PLACE, name) for name in map(flat, entry.scenes)}
-                find_copies(
-                    entry, {f"{n}-seed0": sample(read_roll_out(f).positions) for n, f in files.items()}
-                )
+                samples = {n: sample(read_roll_out(file).positions) for n, file in files.items()}
+                find_copies(entry, {f"{n}-seed0": samples[n] for n in samples})
             print(f"{entry.path}: nothing found; {len(entry.scenes)} of {len(SCENES)} scenes")
             return 0
         from benchmarks.evaluate import evaluate  # loads the simulator
@@ -190,7 +188,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def read_entry(path: Path) -> Entry:
     """Read the metadata of an entry.
 
-    Raises StudyError for a link out of the folder and a wrong field, OSError for a pipe or a device.
+    Raises StudyError for a link out of the folder or a wrong field, OSError for a pipe or device.
     """
     for file in path.rglob("*"):
         if not Path(os.path.realpath(file)).is_relative_to(path.resolve()):
@@ -211,7 +209,7 @@ def check_scores(entry: Entry) -> None:
 
 
 def write_scores(entry: Entry, run: RunFolder) -> int:
-    """Write rows without what the machine adds to them, and digests of all that was scored; return how many.
+    """Write rows without what the machine adds, and digests of what was scored; return how many.
 
     The bytes are the same each time, but for commit and date. Raises StudyError for a copy, and where a
     roll-out did not come to its last frame: the mean over the other scenes would be of easier ones.
@@ -260,7 +258,7 @@ def sample(positions: Positions) -> Floats:
 
 
 def find_copies(entry: Entry, samples: dict[str, Floats]) -> None:
-    """Raise StudyError for a roll-out whose frames another scene, or another entry beside it, has.
+    """Raise StudyError for a roll-out whose frames another scene, seed, or entry beside it, has.
 
     So duplicates are found, frames in reverse, and one frame held. samples: name of a roll-out -> (T,N).
     """

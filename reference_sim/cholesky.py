@@ -62,17 +62,10 @@ class SuperLUSolver:
 
     def factorise(self, values: np.ndarray) -> bool:
         """Factorise the matrix with these values (nnz,); False if not positive definite."""
-        size = len(self._order)
-        lower = sp.tril(
-            sp.csc_matrix((values, self._indices, self._indptr), shape=(size, size)), format="csc"
-        )
-        A = sp.csc_matrix(lower + sp.tril(lower, -1).T)[self._order][:, self._order]
+        A = symmetrise(values, self._indices, self._indptr)[self._order][:, self._order]
         try:
             lu = spla.splu(
-                sp.csc_matrix(A),
-                permc_spec="NATURAL",
-                diag_pivot_thresh=0.0,
-                options={"SymmetricMode": True},
+                A, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
             )
         except RuntimeError:  # exactly singular
             return False
@@ -90,6 +83,12 @@ class SuperLUSolver:
         return x
 
 
+def symmetrise(values: np.ndarray, indices: np.ndarray, indptr: np.ndarray) -> sp.csc_matrix:
+    """Return the whole symmetric (n, n) matrix of a lower one, whose diagonal blocks are stored whole."""
+    lower = sp.tril(sp.csc_matrix((values, indices, indptr)), format="csc")
+    return sp.csc_matrix(lower + sp.tril(lower, -1).T)
+
+
 def nested_dissection(adjacency: sp.csr_matrix) -> np.ndarray:
     """Return a fill-reducing order (n,) of a vertex graph by METIS."""
     if adjacency.shape[0] < 4:
@@ -101,7 +100,7 @@ def nested_dissection(adjacency: sp.csr_matrix) -> np.ndarray:
     return np.asarray(permutation, dtype=np.int64)
 
 
-WIDTH = 4  # numbers a row of right sides: x, y, z and one to fill the lane
+RIGHT_SIDES = 4  # numbers a row of right sides: x, y, z and one to fill the lane
 
 
 class ScalarPattern:
@@ -224,7 +223,7 @@ def factorise(
 
 @njit(cache=True, error_model="numpy", fastmath={"contract"})
 def solve(starts, rows, L, D, b):
-    """Replace b (n, WIDTH), in the factor's order, by the solution."""
+    """Replace b (n, RIGHT_SIDES), in the factor's order, by the solution."""
     count = len(D)
     for j in range(count):
         b0, b1, b2, b3 = b[j, 0], b[j, 1], b[j, 2], b[j, 3]

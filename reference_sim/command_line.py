@@ -11,7 +11,7 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, NoReturn, ParamSpec
 
-from reference_sim.files.atomic_files import disk_full
+from reference_sim.files.atomic_files import disk_full, is_writable
 
 BAD_INPUT, DISK_FULL, INTERRUPTED = 2, 1, 130  # exit status
 Given = ParamSpec("Given")
@@ -102,7 +102,7 @@ def announce_compilation() -> None:
     if not must_compile():
         return
     folders = _kernel_folders()
-    writable = [folder for folder in folders if _can_be_written(folder)]
+    writable = [folder for folder in folders if is_writable(folder)]
     message = "first use: kernels are compiled, about half a minute of each core, once"
     if not writable:
         message = (
@@ -120,9 +120,3 @@ def _kernel_folders() -> list[Path]:
         return [Path(folder)]
     cache = os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return [Path(__file__).parent, Path(cache, "numba")]
-
-
-def _can_be_written(folder: Path) -> bool:
-    """Return whether a folder can be written, or made."""
-    nearest = next(path for path in (folder, *folder.parents) if os.path.exists(path))
-    return os.path.isdir(nearest) and os.access(nearest, os.W_OK)

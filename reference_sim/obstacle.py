@@ -83,10 +83,10 @@ class Obstacle:
         rest_positions: np.ndarray | None = None,
         region: float = DEFAULT_REGION,
     ) -> None:
-        positions = np.asarray(positions, dtype=np.float64)
+        positions = np.array(positions, dtype=np.float64)
         self.positions = positions[None] if positions.ndim == 2 else positions
-        self.faces = np.ascontiguousarray(faces, dtype=np.int64)
-        check_closed(self.positions, self.faces)
+        check_closed(self.positions, np.asarray(faces))
+        self.faces = np.array(faces, dtype=np.int64, order="C")
         self.region = float(region)
         self.rest_centroids: np.ndarray | None = None
         if rest_positions is not None:
@@ -229,7 +229,7 @@ class Obstacle:
 
     def moves_beside(self, points: np.ndarray) -> bool:
         """Return whether it moves, and most points (N, 3) [m] are within BESIDE of it in frame 0."""
-        if self.frames == 1 or len(points) == 0:
+        if not np.ptp(self.positions, axis=0).any() or len(points) == 0:
             return False
         gaps = np.linalg.norm(points - self._nearest(points, 0).points, axis=1)
         return bool(np.median(gaps) <= BESIDE)

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from reference_sim.cholesky import nested_dissection
+from reference_sim.cholesky import nested_dissection, symmetrise
 from reference_sim.energies.energy import Energy, Step
 from reference_sim.kernels.kernel_cache import njit
 from reference_sim.kernels.lanes import BlockPlaces
@@ -155,9 +155,7 @@ class HessianPattern:
 
     def symmetrise(self, values: np.ndarray) -> sp.csc_matrix:
         """Return the whole symmetric (3n, 3n) matrix."""
-        # The upper halves of its diagonal blocks are stored too.
-        lower = sp.tril(sp.csc_matrix((values, self.indices, self.indptr)), format="csc")
-        return sp.csc_matrix(lower + sp.tril(lower, -1).T)
+        return symmetrise(values, self.indices, self.indptr)
 
 
 def _block_keys(stencils: np.ndarray, n: int) -> np.ndarray:
@@ -230,7 +228,6 @@ class Potential:
 
     def terms(self, x: np.ndarray) -> dict[str, float]:
         """Return the energy of each term [J] at x (V, 3) [m], by name."""
-        x = self._check(x)
         return {energy.name: energy.value_and_gradient(x)[0] for energy in self.energies}
 
     def value(self, x: np.ndarray) -> float:
@@ -243,20 +240,13 @@ class Potential:
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return both at once [J], [N]: they share most of their work."""
-        x = self._check(x)
-        total, gradient = 0.0, np.zeros_like(x)
+        x, gradient = self.energies[0].start_gradient(x)
+        total = 0.0
         for energy in self.energies:
             value, part = energy.value_and_gradient(x)
             total += value
             gradient += part
         return total, gradient
-
-    def _check(self, x: np.ndarray) -> np.ndarray:
-        """Return positions for kernels, which look at no bounds. Raises ValueError for another shape."""
-        x = np.ascontiguousarray(x, dtype=np.float64)
-        if x.shape != (expected := (self.cloth.vertex_count, 3)):
-            raise ValueError(f"positions have shape {x.shape}: expected {expected} [m]")
-        return x
 
     def largest_step(self, x: np.ndarray, direction: np.ndarray) -> float:
         """Return the largest share of `direction` (V, 3) [m] that every term allows from x (V, 3)."""
@@ -287,7 +277,7 @@ class Potential:
 
     def hessian(self, x: np.ndarray) -> sp.csc_matrix:
         """Return second derivatives (3V, 3V) [N/m] at x (V, 3) [m], coordinates of a vertex side by side."""
-        x = self._check(x)
+        x, _ = self.energies[0].start_gradient(x)
         pattern = self.pattern(np.ones(self.cloth.vertex_count, dtype=bool))
         changing = pattern.hessians(x)
         pattern = pattern.widen(changing)

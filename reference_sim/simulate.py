@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from reference_sim.cloth import Cloth, MeshError
 from reference_sim.command_line import Parser, announce_compilation, command
+from reference_sim.files.atomic_files import demand_writable_folder
 from reference_sim.files.mesh_files import (
     join_seams,
     read_mesh,
@@ -78,6 +79,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     path: Path = options.out
     if path.suffix.lower() != ".vtkhdf" or path.exists() or not path.parent.is_dir():
         raise ValueError(f"{path}: name a new file that ends in .vtkhdf, in a folder that exists")
+    demand_writable_folder(path.parent)
+    if options.frames is not None and options.frames < 2:
+        raise ValueError(f"--frames {options.frames}: frame 0 is the start: give 2 or more")
     if options.self_contact and find_spec("ipctk") is None:
         raise ValueError("--self-contact: needs the package ipctk: pip install ipctk")
     if options.obstacle_rest and not options.obstacle:

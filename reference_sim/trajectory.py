@@ -53,7 +53,7 @@ class Trajectory:
     positions: np.ndarray  # (T, V, 3) [m]
     faces: np.ndarray  # (F, 3)
     times: np.ndarray  # (T,) [s]
-    # (T,) time on the clock for each frame [s]; nan where none was taken, as by default
+    # (T,) time on the clock for each frame [s], 0 for a start; nan where none was taken, as by default
     frame_seconds: np.ndarray = field(default_factory=lambda: np.empty(0))
     status: str = "ok"
     reason: str = ""
@@ -118,29 +118,33 @@ def _read(path: Path) -> Trajectory:
         provenance = json.loads(benchmark.attrs["provenance"])
         if not isinstance(provenance, dict):
             raise ValueError("its provenance is no JSON object")
-        frames = int(benchmark.attrs["frames"])
         fields = benchmark["frame_fields"]
         vertices = int(vtk["NumberOfPoints"][0])
-        return Trajectory(
-            positions=vtk["Points"][: frames * vertices].reshape(frames, vertices, 3),
+        trajectory = Trajectory(
+            positions=vtk["Points"][:].reshape(-1, vertices, 3),
             faces=vtk["Polygons/Connectivity"][:].reshape(-1, 3),
-            times=vtk["Steps/Values"][:frames],
-            frame_seconds=benchmark["frame_seconds"][:frames],
+            times=vtk["Steps/Values"][:],
+            frame_seconds=benchmark["frame_seconds"][:],
             status=str(benchmark.attrs["status"]),
             reason=str(benchmark.attrs["reason"]),
             provenance=provenance,
-            frame_fields={name.replace(":", "/"): fields[name][:frames] for name in fields},
+            frame_fields={name.replace(":", "/"): fields[name][:] for name in fields},
         )
+    of_frames = trajectory.times, trajectory.frame_seconds, *trajectory.frame_fields.values()
+    if {len(values) for values in of_frames} != {trajectory.frames}:
+        raise ValueError("its numbers are not of as many frames as its positions")
+    if not np.isin(trajectory.faces, np.arange(vertices)).all():
+        raise ValueError("its faces name vertices that are not there")
+    return trajectory
 
 
 def _write_benchmark(file: h5py.File, trajectory: Trajectory) -> None:
     """Write what VTK has no place for."""
     benchmark = file.create_group("benchmark")
     benchmark.attrs.update(
-        frames=trajectory.frames,
         status=trajectory.status,
         reason=trajectory.reason,
-        provenance=json.dumps(trajectory.provenance),
+        provenance=json.dumps(trajectory.provenance, default=lambda number: number.tolist()),
     )
     benchmark["frame_seconds"] = np.asarray(trajectory.frame_seconds, dtype="f8")
     fields = benchmark.create_group("frame_fields")
@@ -158,7 +162,7 @@ def _write_vtk(file: h5py.File, trajectory: Trajectory) -> None:
     root["NumberOfPoints"] = np.array([count], dtype="i8")
     root.create_dataset(
         "Points", data=np.asarray(trajectory.positions, dtype="f8").reshape(-1, 3), maxshape=(None, 3),
-        chunks=(count, 3), **PACKED,
+        chunks=(count, 3), **PACKED,  # also of no frames
     )  # fmt: skip
     for name in ("Vertices", "Lines", "Polygons", "Strips"):
         cells = trajectory.faces if name == "Polygons" else np.zeros((0, 3))

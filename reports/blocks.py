@@ -47,7 +47,7 @@ class Report:
 
 @dataclass(frozen=True)
 class TableBlock:
-    """A table; the PDF prints at most so many lines, none that ends in one of `left_out`."""
+    """A table; the PDF prints at most so many rows, and none with a cell among `left_out`."""
 
     name: str
     limit: int = ROWS

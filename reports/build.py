@@ -1,6 +1,6 @@
 """python -m reports.build RUN_DIR: tables, figures, page and PDF of a finished run.
 
-Reads run.json, results.csv, frame_energies.csv and trajectories in RUN_DIR, and nothing else; writes
+Reads run.json, results.csv, frame_energies.csv and trajectories in RUN_DIR, and reports/published; writes
 tables/*.csv, for_your_paper.csv and .tex, figures/*.svg and *.png, report.html and report.pdf there.
 """
 
@@ -29,7 +29,7 @@ class Built:
         pdf: path of the PDF.
         problems: a sentence for each file that could not be read, times of several machines, edited
             files.
-        answer: page one in few lines of text, empty for a run that has none.
+        answer: page one, and how the published run agrees, in few lines; may be empty.
     """
 
     pdf: Path
@@ -41,8 +41,7 @@ def build_report(run_dir: str | Path) -> Built:
     """Make tables, figures, page and PDF of a run.
 
     Raises:
-        ResultsError: when run.json or results.csv is absent, broken or of an earlier version; before
-            anything is written.
+        ResultsError: as of read_run, before anything is written.
 
     >>> print(build_report("reports/runs/first").answer)  # doctest: +SKIP
     """
@@ -113,8 +112,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = Parser(
         prog="python -m reports.build",
         description="Make tables/*.csv, figures/*, report.html and report.pdf of a finished run.",
-        epilog="Exit status: 0 when all is made, 1 when a file of the run could not be read (the report "
-        "names it), was edited, or times are of several machines, 2 when RUN_DIR is no run folder.",
+        epilog="Exit status: 0 when all is made, 1 when a file could not be read (standard error names "
+        "it) or was edited, or times are of several machines, 2 when RUN_DIR is no run folder.",
     )
     parser.add_argument("run_dir", metavar="RUN_DIR", help="folder with run.json and results.csv")
     options = parser.parse_args(arguments)

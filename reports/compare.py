@@ -21,9 +21,9 @@ from reports.statistics.relative_excess import RELATIVE_EXCESS
 from reports.text.text_table import markdown_table
 
 EXAMPLES = """examples:
-  python -m reports.compare before after                         chief metrics of each method; what is worse
-  python -m reports.compare before after --metrics '*'           each change in a line
-  python -m reports.compare before after --shared                of what both runs have
+  python -m reports.compare before after                chief metrics of each method; what is worse
+  python -m reports.compare before after --metrics '*'  each change in a line
+  python -m reports.compare before after --shared       of what both runs have
 
 A mean of an answer has changed beyond 2 or 5 % and the noise of both runs, with p below 0.05; rules of times,
 checks, single motions and single seeds: docs/notebook/statistics.md.

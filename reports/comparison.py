@@ -12,7 +12,7 @@ import pandas as pd
 
 from benchmarks.metric import Metric
 from benchmarks.results.protocol import LEVEL, one_protocol
-from benchmarks.results.row import ResultsError
+from benchmarks.results.row import USABLE, ResultsError
 from benchmarks.results.run_folder import OF_SCENES
 from reports.finished_run import Run
 from reports.scene_changes import (
@@ -52,8 +52,12 @@ def find_losses(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
     """Return a line for each method or metric that the later run lacks somewhere."""
     keys = [frame.set_index(CELL).index for frame in (one, other)]
     losses = one[one["usable"] & ~keys[0].isin(keys[1])].astype({"method": str, "metric": str})
-    lacking = losses.set_index(CELL[:3]).index.isin(other.set_index(CELL[:3]).index)
+    cells = losses.set_index(CELL[:3]).index
+    lacking = cells.isin(other.set_index(CELL[:3]).index)
     losses["metric"] = losses["metric"].where(lacking, "all metrics")
+    # `endings` reports cells that were ok and failed.
+    failed = other[~other["status"].isin(USABLE)].set_index(CELL[:3]).index
+    losses = losses[~cells.isin(failed) | (losses["status"] != "ok")]
     changes = []
     for (method, metric), rows in losses.groupby(["method", "metric"], sort=False):
         places, seeds = (", ".join(map(str, rows[name].unique())) for name in ("place", "seed"))
@@ -89,13 +93,12 @@ def endings(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
 
 def _find_fallen(run: Run, frames: Sequence[pd.DataFrame], basis: pd.DataFrame) -> list[Change]:
     """Return roll-outs that are worn in one run alone: those that fell off have no excess."""
-    excesses = [add_excess(run, frame, basis=basis) for frame in frames]
     ends = []
-    for frame in excesses:
-        rows = frame[frame["metric"] == RELATIVE_EXCESS.name].copy()
-        rows["status"] = rows["usable"].map({True: "ok", False: "failed"})
-        rows["reason"] = rows["usable"].map({True: "", False: "fell off the body"})
-        ends.append(rows)
+    for frame in frames:
+        rows = add_excess(run, frame, basis=basis)
+        rows = rows[rows["metric"] == RELATIVE_EXCESS.name]
+        status = rows["usable"].map({True: "ok", False: "failed"})
+        ends.append(rows.assign(status=status, reason="fell off the body"))
     return endings(*ends)
 
 
@@ -157,7 +160,7 @@ def compare(
     if not times or set(one.frame["hardware"]) != set(other.frame["hardware"]):
         machines = [m.name for run in (one, other) for m in run.metrics.values() if m.of == "machine"]
         of_metrics = [frame[~frame["metric"].isin(machines)] for frame in of_metrics]
-    losses = [] if shared else find_losses(*of_metrics)
+    losses = [] if shared else find_losses(of_metrics[0], frames[1])
     pair = _intersect(of_metrics, *CELL)
     if pair[0].empty:
         raise ResultsError(
@@ -302,9 +305,8 @@ def _means(
         if key[-1] != WORST and (not mean.seeded or mean.seeds > 1)
     }  # fmt: skip
     metrics = _metrics(run)
-    scales = (
-        rows[0].groupby(["place", "metric"])["value"].agg(lambda values: values.abs().median()).to_dict()
-    )
+    sizes = rows[0]["value"].abs().groupby([rows[0]["place"], rows[0]["metric"]])
+    scales = sizes.median().to_dict()
     candidates = [
         (place, method, metric := metrics[name], mean, new_mean, _effect(metric, new_mean, mean))
         for (place, method, name), mean in earlier_means.items()

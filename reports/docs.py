@@ -26,7 +26,7 @@ def documents(root: Path = ROOT) -> Iterator[tuple[Path, str, str]]:
         text = path.read_text(encoding="utf-8")
         try:
             yield path, text, fill(text, published_part)
-        except (ValueError, LookupError) as error:
+        except (ValueError, LookupError, ImportError) as error:
             raise ValueError(f"{path}: {error}") from None
     if (entries := root / ENTRIES).is_dir():
         path = entries / PAGE
@@ -39,11 +39,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; return its exit status."""
     parser = Parser(
         prog="python -m reports.docs",
-        description="Make the parts of README.md and docs/ that stand between '<!-- generated: ... -->' and "
-        "'<!-- end of generated -->' from the runs in reports/published and from the code, "
-        "and the page of entries.",
+        description="Make the parts of README.md and docs/ behind '<!-- generated: ... -->' from the runs in "
+        "reports/published and from the code, and the page of entries.",
         epilog="Exit status: 0 when all is up to date or written, 1 when --check finds a part that is not, 2 "
-        "for a part or a run that cannot be read. Example: python -m reports.docs --check",
+        "for a part or a run that cannot be read.",
     )
     parser.add_argument("--check", action="store_true", help="write nothing; name documents out of date")
     options = parser.parse_args(arguments)

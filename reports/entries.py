@@ -16,12 +16,13 @@ from reports.finished_run import Run, read_run
 from reports.page.write_page import fill_page, table_data
 from reports.statistics.effects import Effect
 from reports.statistics.means_and_spreads import mean_of
+from reports.statistics.pareto import TIME
 from reports.statistics.relative_excess import excess_of
-from reports.tables.table import Cell, Column, Table
+from reports.tables.table import Cells, Column, Table
 
 ENTRIES, PAGE = "submissions", "index.html"
 SCRIPTS = ("tables", "entries")  # in this order
-DYNAMICS, PENETRATION, TIME = "dynamics/common_correlation", "penetration/surface", "cost/frame"
+DYNAMICS, PENETRATION = "dynamics/common_correlation", "penetration/surface"
 ROLES = ("baseline", "network", "solver", "external")  # of the project's own methods
 PICTURE = "picture.png"
 # What stands behind numbers: of an entry whose files are not as they were scored nothing was computed here.
@@ -64,9 +65,11 @@ class Scored:
 
     def proof(self) -> str:
         """Return what its numbers rest on: a program, files, or a declaration."""
-        files = self.run.config.get("entry") or {}
-        if self.folder is None or RunFolder(self.folder).find_changes(files) or not files:
-            return VERIFIED if self.folder is None else UNVERIFIED
+        if self.folder is None:
+            return VERIFIED
+        files = self.run.config.get("entry")
+        if not files or RunFolder(self.folder).find_changes(files):
+            return UNVERIFIED
         return VERIFIED if self.run.config["metadata"].get("program") else FILES_ONLY
 
     def title_cell(self) -> list[str | None]:
@@ -80,7 +83,7 @@ class Scored:
             f"data:image/png;base64,{data}" if data else None,
         ]  # fmt: skip
 
-    def cells(self) -> tuple[Cell, ...]:
+    def cells(self) -> Cells:
         """Return its row, as COLUMNS has it."""
         rows = self.run.garment_rows
         rows = rows[rows["scene"].isin(self.scenes)]
@@ -110,9 +113,8 @@ def load_entry(folder: Path) -> Scored:
         raise ResultsError(f"{folder}: has no scores: {advice}")
     run, name = read_run(scores), folder.resolve().name
     try:
-        title, authors, data = (
-            run.config["metadata"][key] for key in ("title", "authors", "training_data")
-        )
+        metadata = run.config["metadata"]
+        title, authors, data = (metadata[key] for key in ("title", "authors", "training_data"))
     except (KeyError, TypeError):
         raise ResultsError(f"{scores.config_path}: has no metadata of an entry: {advice}") from None
     scenes = tuple(sorted(set(run.frame[run.frame["method"] == name]["scene"])))
@@ -165,7 +167,7 @@ def entries_tables(
     return tables
 
 
-def _excess(cells: tuple[Cell, ...]) -> float:
+def _excess(cells: Cells) -> float:
     return cells[2].shown if isinstance(cells[2], Effect) and cells[2].complete else float("inf")
 
 

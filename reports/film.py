@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from reports.finished_run import Run
 
 EXAMPLES = """examples:
-  python -m reports.film reports/runs/NAME --scene tshirt/kick --methods simulation,snug -o kick.gif
-  python -m reports.film reports/runs/NAME --scene tshirt/kick --methods simulation,mine -o kick.png
-  python -m reports.film reports/runs/NAME --scene tshirt/kick --methods snug -o kick.pc2
+  python -m reports.film RUN --scene tshirt/kick --methods simulation,snug -o kick.gif
+  python -m reports.film RUN --scene tshirt/kick --methods simulation,mine -o kick.png
+  python -m reports.film RUN --scene tshirt/kick --methods snug -o kick.pc2
 
 A .png is the frame in which the first method's inertia term is largest. A .pc2 becomes kick_snug.pc2 and
 kick_body.pc2, all vertices, with an .obj each: metres, y up, for Blender's Mesh Cache modifier.
@@ -52,7 +52,9 @@ def select_roll_outs(
         cloth = run.roll_outs.cloth(scene, method, int(shown_seed)) if len(of_method) else None
         if cloth is None or not cloth.finite().frames:
             reason = "; ".join(run.problems) or _list_stored(folder, run, scene)
-            raise ResultsError(f"{folder.path}: no roll-out of '{method}' in {scene}: {reason}")
+            cell = f"'{method}' in {scene}"
+            cell += f", seed {shown_seed}" if len(of_method) else ""
+            raise ResultsError(f"{folder.path}: no roll-out of {cell}: {reason}")
         cloths[method] = cloth.finite()
     labels = {name: run.label(name) for name in cloths}
     return SceneRollOuts(scene, cloths, run.roll_outs.body(scene), labels)
@@ -94,13 +96,16 @@ def write_frames(path: Path, frames: Iterable[np.ndarray], rate: float) -> None:
     drawn[0].save(path, save_all=True, append_images=drawn[1:], duration=durations, loop=0)
 
 
-def write_point_caches(path: Path, group: SceneRollOuts) -> None:
-    """Write the vertices of each method, and of the body, as NAME_METHOD.pc2 with an .obj beside it."""
+def write_point_caches(path: Path, group: SceneRollOuts) -> list[Path]:
+    """Write NAME_METHOD.pc2 and .obj of each method and of the body; return all paths."""
     from reference_sim.trajectory import write_point_cache
 
     body = {"body": group.body} if group.body else {}
+    paths: list[Path] = []
     for name, mesh in {**group.series, **body}.items():
-        write_point_cache(path.with_stem(f"{path.stem}_{name.replace('/', '-')}"), mesh)
+        stem = f"{path.stem}_{name.replace('/', '-')}"
+        paths += write_point_cache(path.with_stem(stem), mesh)
+    return paths
 
 
 @command("reports.film")
@@ -123,6 +128,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     path, methods = Path(options.out), [name.strip() for name in options.methods.split(",")]
     if not 64 <= options.width <= 2000:
         raise ValueError("--width is 64 to 2000")
+    if not math.isfinite(options.azimuth):
+        raise ValueError("--azimuth is a finite number")
     if path.suffix not in (".gif", ".png", ".pc2"):
         raise ValueError(f"{path}: a film ends in .gif, a picture in .png, point caches in .pc2")
     demand_writable_folder(path.parent)
@@ -130,11 +137,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     one_frame = [group.lively_frame()[0]] if path.suffix == ".png" else None
     images = draw_frames(group, options.width, options.azimuth, one_frame)
     if path.suffix == ".pc2":
-        write_point_caches(path, group)
-    else:
-        dt = group.longest.dt
-        with replacing(path) as temporary:
-            write_frames(temporary, images, 1.0 / dt if dt > 0.0 else 1.0)
+        print(*write_point_caches(path, group), sep="\n")
+        return 0
+    dt = group.longest.dt
+    with replacing(path) as temporary:
+        write_frames(temporary, images, 1.0 / dt if dt > 0.0 else 1.0)
     print(path)
     return 0
 

@@ -60,7 +60,7 @@ class RollOuts:
         return None
 
 
-COMPARED = ("scene", "method", "metric")  # columns kept as categories, for speed
+CATEGORIES = ("scene", "method", "metric")  # columns kept as such, for speed
 SUITES = ("garments", "speed", "validation", "extremes", "shapes")  # that have tables of their own
 
 
@@ -83,9 +83,8 @@ class Run:
     frame: one line per row, the columns of results.csv and `usable` (its value may enter a mean), `table`
     (of its metric) and `case` (the check or stress test that it is, else empty). changed: files that are
     not as the run wrote them. protocol: of its rows; empty where all are a user's own. frame_energies:
-    lines of frame_energies.csv, empty without the file. roll_outs: reads stored roll-outs
-    when they are asked for. problems: a sentence for each file that could not be read, added to while
-    roll-outs are read.
+    lines of frame_energies.csv, empty without the file. roll_outs: reads them when they are asked for.
+    problems: a sentence for each file that could not be read so far.
     """
 
     config: Mapping[str, Any]
@@ -201,8 +200,14 @@ class Run:
 
 def pick_seeds(rows: pd.DataFrame) -> pd.Series:
     """Return (scene, method) -> first seed whose roll-out came to its end; the first where none did."""
-    good = rows[rows["usable"]].groupby(["scene", "method"])["seed"].min()
-    return good.combine_first(rows.groupby(["scene", "method"])["seed"].min()).astype(int)
+    ordered = rows.sort_values(["usable", "seed"], ascending=[False, True])
+    return ordered.groupby(["scene", "method"])["seed"].first()
+
+
+def shown_frames(run: Run, rows: pd.DataFrame) -> pd.DataFrame:
+    """Return the frame energies in the scenes of these rows, of each method those of `pick_seeds`."""
+    frames = run.frame_energies
+    return frames if frames.empty else frames.merge(pick_seeds(rows).reset_index())
 
 
 def make_run(config: Mapping[str, Any], rows: Sequence[Row], changed: Sequence[str] = ()) -> Run:
@@ -219,25 +224,24 @@ def make_run(config: Mapping[str, Any], rows: Sequence[Row], changed: Sequence[s
     metrics = {name: _metric(name, units[name], declared.get(name) or {}) for name in names}
     frame["table"] = frame["metric"].map({name: metric.table for name, metric in metrics.items()})
     frame["case"] = _cases(frame, config.get("cases") or {})
-    frame = frame.astype({name: pd.CategoricalDtype(sorted(set(frame[name]))) for name in COMPARED})
+    kinds = {name: pd.CategoricalDtype(sorted(set(frame[name]))) for name in CATEGORIES}
+    frame = frame.astype(kinds)
     methods = _methods(frame, config.get("methods") or {})
     return Run(config, frame, metrics, methods, changed)
 
 
 def _metric(name: str, unit: str, declared: Mapping[str, Any]) -> Metric:
-    lower = declared.get("lower_is_better")
-    return Metric(
-        name=name, unit=unit or "1", title=str(declared.get("title") or name),
-        definition=str(declared.get("definition") or ""), table=str(declared.get("table") or ""),
-        lower_is_better=None if lower is None else bool(lower),
-        arbitrary_zero=bool(declared.get("arbitrary_zero")), of=str(declared.get("of") or "answer"),
-    )  # fmt: skip
+    fields: dict[str, Any] = {"title": name, "definition": ""}
+    fields |= {key: value for key, value in declared.items() if key in Metric.__dataclass_fields__}
+    return Metric(**fields | {"name": name, "unit": unit or "1"})
 
 
 def _methods(frame: pd.DataFrame, declared: Mapping[str, Any]) -> dict[str, ReportedMethod]:
     """Return the methods in the order of run.json, those that it does not know behind."""
     columns = ["method", "role", "family", "level", "base"]
     rows = frame[frame["method"] != ""][columns].drop_duplicates("method")
+    if unknown := sorted(set(rows["role"]) - {*ROLES}):
+        raise ValueError(f"role '{unknown[0]}' is none of {', '.join(filter(None, ROLES))}")
     by_name = {
         name: ReportedMethod(
             name, str((declared.get(name) or {}).get("label") or name), role, family or name,
@@ -271,8 +275,15 @@ def read_run(folder: RunFolder) -> Run:
     config, rows = folder.read_config(), folder.read_rows()
     if not rows:
         raise ResultsError(f"{folder.rows_path}: holds no rows; nothing to report")
-    changes = folder.find_changes(config.get("digests") or {})
-    run = make_run(config, rows, [name for name, state in changes.items() if state == "damaged"])
+    try:
+        changes = folder.find_changes(config.get("digests") or {})
+        damaged = [name for name, state in changes.items() if state == "damaged"]
+        run = make_run(config, rows, damaged)
+        run.garments(run.garment_rows)  # reads the scenes
+    except (ValueError, TypeError, AttributeError) as error:
+        raise ResultsError(
+            f"{folder.config_path}: does not fit results.csv ({error}); take both from one run"
+        ) from None
     return replace(
         run,
         protocol=one_protocol(run.frame["protocol"], folder.rows_path),

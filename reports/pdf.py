@@ -45,7 +45,7 @@ def _text(value: Any) -> str:
 
 
 Values = dict[str, Any]  # of one block, as JSON takes them
-WHOLE = 8  # rows of a table that stays on one page, as that of page one
+UNBROKEN = 8  # rows of a table that stays on one page, as that of page one
 FEW = 5  # up to so many columns share a table's width evenly
 
 
@@ -89,7 +89,7 @@ def lay_out_table(run: Run, table: Table) -> Values:
             for column, width in zip(columns, _widths(columns))
         ],
         "groups": [{"title": title, "rows": rows} for title, rows in groups.items()],
-        "breakable": len(table.rows) > WHOLE,
+        "breakable": len(table.rows) > UNBROKEN,
     }
 
 

@@ -14,8 +14,9 @@ from scipy.ndimage import uniform_filter1d
 
 from reference_sim.trajectory import Trajectory
 from reports.figures.plotting import DOTS, PAGE_WIDTH, Drawing, file_name, new_figure
-from reports.finished_run import Run, pick_seeds
+from reports.finished_run import Run, pick_seeds, shown_frames
 from reports.statistics.outcomes import LEARNED, leads
+from reports.statistics.relative_excess import TOTAL
 from reports.tables.table import name_scene
 
 BODY_COLOUR = (0.80, 0.77, 0.74)
@@ -31,12 +32,12 @@ ABOVE = 8.0  # [degrees] that the camera looks down
 class Camera:
     """An orthographic camera that looks a little from above; y is up and a body faces +z.
 
-    centre (3,) [m] and height [m] are of what it sees, turn [degrees] is about the vertical.
+    centre (3,) [m] of the view, its height [m]; turn [degrees] about the vertical.
     """
 
     centre: np.ndarray
     height: float
-    turn: float = -25.0
+    turn: float
 
     def project(self, positions: np.ndarray) -> np.ndarray:
         """Return positions (V,3) [m] as right, up and towards the camera, from the picture's middle [m]."""
@@ -53,11 +54,11 @@ def camera_axes(turn: float) -> np.ndarray:
 
 @dataclass(frozen=True)
 class Surface:
-    """A mesh to be painted: positions (V,3) [m], faces (F,3), a colour (3,) or one of each vertex (V,3)."""
+    """A mesh to be painted: positions (V,3) [m], faces (F,3), its colour."""
 
     positions: np.ndarray
     faces: np.ndarray
-    colour: np.ndarray | tuple[float, float, float]
+    colour: tuple[float, float, float]
     lift: float = 0.0
 
 
@@ -97,8 +98,8 @@ def _paint(
     normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
     normals *= np.where(normals[:, 2:] < 0.0, -1.0, 1.0)
     key, fill = (np.clip(normals @ (light / np.linalg.norm(light)), 0.0, 1.0) for light in (KEY, FILL))
-    colours = np.broadcast_to(np.asarray(surface.colour, dtype=float), (len(view), 3))
-    image[pixels] = (0.36 + 0.72 * key + 0.16 * fill)[:, None] * (weights * colours[corners]).sum(axis=1)
+    shade = 0.36 + 0.72 * key + 0.16 * fill
+    image[pixels] = shade[:, None] * np.asarray(surface.colour)
 
 
 def _rasterise(corners: np.ndarray, w: int, h: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -254,10 +255,9 @@ def worst_frame(run: Run) -> Drawing | None:
     """
     rows = run.garment_rows
     network = next((name for name in leads(run, rows) if run.methods[name].role in LEARNED), "")
-    if "total" not in run.frame_energies:
+    frames = shown_frames(run, rows[rows["metric"] == TOTAL])
+    if "total" not in frames:
         return None
-    frames = run.frame_energies[run.frame_energies["scene"].isin(set(rows["scene"]))]
-    # Of the first seed.
     totals = frames.pivot_table("total", ["scene", "seconds"], "method", "first")
     if not {network, run.reference} <= set(totals):
         return None
@@ -275,7 +275,7 @@ def worst_frame(run: Run) -> Drawing | None:
 def _gather(run: Run, scene: str) -> SceneRollOuts | None:
     """Return page one's methods that came to the scene's end; None without any."""
     rows = run.garment_rows
-    rows = rows[(rows["metric"] == "energy/total") & (rows["scene"] == scene)]
+    rows = rows[(rows["metric"] == TOTAL) & (rows["scene"] == scene)]
     seeds = pick_seeds(rows).get(scene, {})
     cloths = {name: run.roll_outs.cloth(scene, name, int(seeds[name])) for name in leads(run, rows)}
     frames = max((cloth.frames for cloth in cloths.values() if cloth), default=0)

@@ -23,7 +23,7 @@ ALIKE = "dynamics/correlation"
 
 def headline(run: Run) -> list[tuple[str, str]]:
     """Return (topic, its sentences) for each topic of page one, the verdict first."""
-    texts = {**_write_topics(run), "How it ended": endings(run)}
+    texts = {**_write_topics(run), "How it ended": _count_endings(run)}
     return [(topic, bind_units(text)) for topic, text in texts.items() if text]
 
 
@@ -68,7 +68,7 @@ def _rate_training(run: Run, rows: pd.DataFrame) -> str:
 
 
 def verdict(run: Run, frame: pd.DataFrame) -> str:
-    """Say what one method has of skinning's excess energy, in which time, and how its dynamics are.
+    """State one method's relative excess, speed-up over the reference, and dynamics.
 
     It is the user's own, or else the first network of page one that these rows have.
     """
@@ -129,13 +129,13 @@ def _certainty(run: Run) -> str:
     return f"Of {tests} of primary claims of the paper {phrase(verdicts)}{remark}."
 
 
-def endings(run: Run) -> str:
+def _count_endings(run: Run) -> str:
     """Say how many cells, checks and stress tests did not end well, and how; empty where all did."""
     parts = []
     for kind, statuses in tally(run).items():
         if bad := [f"{statuses[name]} {name}" for name in BAD if statuses[name]]:
             parts.append(f"of {sum(statuses.values()):,} {kind} {', '.join(bad)}")
-    parts += [f"{len(run.problems)} files could not be read"] if run.problems else []
+    parts += ["some files could not be read: standard error names them"] if run.problems else []
     text = "; ".join(parts)
     return f"{text[:1].upper()}{text[1:]}." if text else ""
 

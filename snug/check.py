@@ -1,4 +1,4 @@
-"""Command `python -m snug.check`: tell whether garments from files can be used, and what mends them."""
+"""Command `python -m snug.check`: tell whether garment files can be used, and what mends them."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Named recipes, and the deviations of the default recipe from the paper's text.
+"""Named recipes.
 
-`default` trains well on a CPU in minutes, `paper` follows the paper's text except for what docs/method.md
-lists, the ablations are the default with one option changed. Imports nothing heavy.
+`default` trains well on a CPU in minutes, `paper` follows the paper's text (exceptions: docs/method.md),
+ablations change the options that their names say. Imports nothing heavy.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Recipe: every choice of a training run in one frozen place. The named ones are in snug.named_recipes.
+"""Recipe: every choice of a training run. The named ones are in snug.named_recipes.
 
 No recipe holds a balancing weight between the energies: there is none. `physics_weight` alone weighs
 them, together, against a distance. `Recipe.terms` names any energy that `find_energy` knows. Imports
@@ -8,6 +8,7 @@ nothing heavy, so that a command can list recipes without loading torch.
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, fields
 from typing import Any
@@ -47,12 +48,12 @@ class Recipe:
             snug.training.training_set), instead of to zero. Not for networks that learn simulated
             vertices, nor where each window gets its own shape (`shape_of`).
         window: frames of a sub-sequence.
-        batch: sub-sequences of a step.
+        batch: sub-sequences of a step; a network of single frames gets batch x window frames.
         window_stride: frames between the starts of two sub-sequences (equal to `window`: none overlap); a
             network of single frames learns from each frame whatever it is.
         even: passes n of an epoch: pass k takes the sub-sequences k, k + n, k + 2n, ... of all motions,
             so that no hard pose first appears after the network has settled. With 1 the order is random.
-        shape_range: bodies get shape numbers from U(-r, r).
+        shape_range: bodies get shape numbers from U(-r, r), where a network reads shape.
         shape_of: receivers of a shape: each `window` in each step anew, as the paper has it, or each
             augmented `clip` once, while original motions stay on the mean body.
         shape_share: share of these clips that leave the mean body.
@@ -62,9 +63,9 @@ class Recipe:
         contact_stiffness: of ContactPenalty, per area of cloth [J/m^5]; None takes the simulator's
             default.
         contact_margin: of ContactPenalty; None takes the simulator's default.
-        mixed: frames of augmented motions (snug.training.augmentation) for each frame of a
-            training motion, up to 20,000; not for networks that learn simulated vertices, whose clips
-            are simulated beforehand.
+        mixed: frames of augmented motions (snug.training.augmentation) for each frame of a training motion,
+            up to 20,000 or 2 GB of anchors; not for networks that learn simulated vertices, whose clips are
+            simulated beforehand.
         turn: standard deviation of the slow turns added in them [rad]. Wide ones help a long training and
             cost a short one much (docs/notebook/training.md).
         terms: energies in the loss, TERMS or any other that `find_energy` knows.
@@ -148,8 +149,8 @@ class Recipe:
             "smoothing", "weight_decay", "h0_sigma", "shape_range", "shape_share", "mixed", "turn",
             "physics_weight",
         ):  # fmt: skip
-            if not getattr(self, option) >= 0:
-                raise ValueError(f"recipe option {option}={getattr(self, option)}: must not be negative")
+            if not 0 <= getattr(self, option) < math.inf:
+                raise ValueError(f"recipe option {option}={getattr(self, option)}: must be at least 0")
         if self.shape_of == "clip" and self.shape_range and not self.mixed:
             raise ValueError("recipe option shape_of='clip': mixed clips get the shapes, so mixed > 0")
         if self.shape_share > 1.0:

@@ -56,7 +56,7 @@ def parse_options(arguments: Sequence[str] | None = None) -> argparse.Namespace:
     add("--steps", type=int, default=4000, help="updates (default: %(default)s)")
     add("--garment", metavar="NAME|FILE", default=TSHIRT,
         help=f"{garments}, or a mesh made for the body (default: %(default)s)")  # fmt: skip
-    add("--vertices", type=int, default=1000, help="of a garment (default: %(default)s)")
+    add("--vertices", type=int, help="of a garment that is tailored (default: 1000)")
     add("--body", metavar="FILE", help="your own body of SMPL's family, .npz or .pkl")
     add("--motions", metavar="PATH",
         help="a motion file or a folder of them (default: the embedded library)")  # fmt: skip
@@ -90,7 +90,9 @@ def check_options(options: argparse.Namespace) -> None:
 def choose_garment(options: argparse.Namespace, body: Body) -> Garment:
     """Return the garment to train for, tailored or read. Raises ValueError."""
     if not is_garment_file(options.garment):
-        return find_template(options.garment).tailor(body, vertices=options.vertices)
+        return find_template(options.garment).tailor(body, vertices=options.vertices or 1000)
+    if options.vertices is not None:
+        raise ValueError(f"--vertices {options.vertices}: a mesh file has its own; leave it out")
     from snug.garments.reading import read_garment  # a tailored garment needs no reader of meshes
 
     return read_garment(parse_garment_file(options.garment), body)
@@ -124,6 +126,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     from snug.body.smpl_files import read_body
     from snug.networks.dressed_body import DressedBody
+    from snug.networks.trained_model import TrainedModel
     from snug.training.checkpoint import Checkpoint
     from snug.training.simulated_data import read_data_set
     from snug.training.train_network import train_network
@@ -141,13 +144,15 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print(f"motion {motion.name}: {motion.source}", file=sys.stderr)
     out = options.out
     checkpoint = Checkpoint(
-        path=out.with_name(f"{out.stem}.checkpoint.safetensors"), minutes=CHECKPOINT_MINUTES,
-        resume=options.resume,
+        path=out.with_name(f"{out.name.removesuffix('.safetensors')}.checkpoint.safetensors"),
+        minutes=CHECKPOINT_MINUTES, resume=options.resume,
     )  # fmt: skip
     if options.resume and out.is_file() and not checkpoint.path.is_file():
+        there = TrainedModel.load(out)
+        if (there.kind, there.seed, there.steps) != (options.model, options.seed, options.steps):
+            raise ValueError(f"{out}: is of another training; delete it, or leave out --resume")
         print(f"{out}: is there, and no checkpoint beside it; nothing to resume")
         return 0
-    out.parent.mkdir(parents=True, exist_ok=True)
     model = train_network(
         options.model, dressed, motions, steps=options.steps, seed=options.seed,
         recipe=RECIPES.get(options.recipe), trajectories=trajectories, device=options.device,
@@ -166,9 +171,10 @@ def print_summary(model: TrainedModel) -> None:
              if name not in ("step", "seconds")]  # fmt: skip
     print(f"recipe {model.recipe.name}, {model.summary['training_frames']} frames")
     print(f"last steps, {model.unit} (energies J), mean over frames: " + "  ".join(terms))
-    for window in model.summary["named_windows"][:5]:
-        if window["action"] != "gradient clipped":  # which is part of the recipe
-            print("step {step}: {window} at {joules} {unit}, {action}".format(**window, unit=model.unit))
+    clipped = "gradient clipped"  # which is part of the recipe
+    windows = [window for window in model.summary["named_windows"] if window["action"] != clipped]
+    for window in windows[:5]:
+        print("step {step}: {window} at {joules} {unit}, {action}".format(**window, unit=model.unit))
     print(f"{model.steps} steps in {model.seconds:.0f} s after {model.setup_seconds:.0f} s of preparation, "
           f"{model.network.megabytes:.1f} MB")  # fmt: skip
 

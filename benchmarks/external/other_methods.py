@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from benchmarks.results.run_folder import flat
 from reference_sim.trajectory import write_obj
 
 if TYPE_CHECKING:
@@ -67,7 +68,7 @@ list there the training motions of other exports.
 
 
 def write_for(method: str, part: Path, scene: BuiltScene) -> None:
-    """Write the files that "hood", "contourcraft" or "ncs" reads of a scene, and a README, into a new folder.
+    """Write what "hood", "contourcraft" or "ncs" reads of a scene, and a README, into a new folder.
 
     Raises ValueError for a scene that has not a posed body in each frame.
     """
@@ -75,7 +76,7 @@ def write_for(method: str, part: Path, scene: BuiltScene) -> None:
     if dressed is None or obstacle is None or len(obstacle.positions) != scene.frames:
         raise ValueError(f"--for {method}: it reads a body in each frame, which {scene.name} has not")
     part.mkdir()
-    name = scene.name.replace("/", "-")
+    name = flat(scene.name)
     if method == "ncs":
         _write_ncs(part, scene, dressed, name)
     else:

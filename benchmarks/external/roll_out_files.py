@@ -8,8 +8,7 @@
 | `.pc2`, `.pc16` | point cache, as Neural Cloth Simulation writes it; faces of the `.obj` of the same name |
 | folder, pattern | one mesh a frame (`.obj`, `.ply` and others), by their evenly spaced numbers |
 
-Nothing is executed. A roll-out that does not fit its scene, in unit, axes, order of vertices, frame rate
-or place, is refused with the remedy.
+Nothing is executed. What does not fit the scene (unit, axes, order, rate, place) is refused.
 """
 
 from __future__ import annotations
@@ -22,6 +21,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from benchmarks.results.run_folder import NOT_TAKEN, flat
 from reference_sim.files.array_file import read_arrays, read_pickled_arrays
 from reference_sim.files.mesh_files import MESH_SUFFIXES, read_mesh, read_sequence, to_metres_y_up
 from snug.file_options import split_words
@@ -32,15 +32,15 @@ if TYPE_CHECKING:
 CHARACTERS = r"\w+.-"  # of a name, as a class of a regular expression
 MODULE = "benchmarks.methods.outside:make_stored"
 PLACE = "{scene}"  # in a path: the scene's name, its slashes as hyphens
-# Share of the cloth's diagonal by which a first frame lies at most from the scene's cloth.
+# Share of the cloth's diagonal: farthest that a first frame lies from the scene's.
 FIRST = 0.15
-# Share of the cloth's diagonal by which its centre stays near where the body carries it.
+# Share of the cloth's diagonal: farthest that its centre lies from where the body is.
 FARTHEST = 0.25
 RATE_TOLERANCE = 1e-4  # of a frame rate: people write it with some digits
 
 
 class RollOutFileError(ValueError):
-    """A roll-out that is unreadable or not of the scene; the message names file and remedy."""
+    """A roll-out is unreadable or not of the scene; the message has file and remedy."""
 
 
 @dataclass(frozen=True)
@@ -60,19 +60,19 @@ class RollOutOption:
         for field, number in (("fps", self.fps), ("ms", self.ms)):
             if number is not None and not 0.0 < number < 1e9:
                 raise RollOutFileError(f"{field}={number}: give a positive number")
-        if not re.fullmatch(rf"\w[{CHARACTERS}]*", self.name):
+        if not re.fullmatch(rf"{NOT_TAKEN}\w[{CHARACTERS}]*", self.name):
             raise RollOutFileError(
-                f"{self.path}: the name '{self.name}' has other than letters, digits and _-+., or "
-                "begins with one of -+."
+                f"{self.path}: the name '{self.name}' has other than letters, digits and _-+., begins "
+                "with one of -+., is 'body' or ends in 'quasi-static': give another, as mine=FILE"
             )
 
     def path_for(self, scene: str) -> str:
         """Return the path of the roll-out in a scene."""
-        return self.path.replace(PLACE, scene.replace("/", "-"))
+        return self.path.replace(PLACE, flat(scene))
 
 
 def parse_roll_out(text: str, *, named: bool = True) -> tuple[str, dict[str, Any]]:
-    """Parse NAME=FILE[,key=value...] into the name and its table; without `named`, NAME= may be absent.
+    """Parse NAME=FILE[,key=value...] into name and table; without `named`, NAME= may be absent.
 
     Raises:
         RollOutFileError: there is no name or no file.
@@ -98,7 +98,7 @@ KEYS |= {name: name for name in (*OVER_TIME, *FACES, "fps")}
 
 @dataclass(frozen=True, eq=False)
 class StoredRollOut:
-    """The contents of a file, in its own unit, axes and order; positions need not be finite.
+    """Contents of a file, in its unit, axes and order; positions need not be finite.
 
     None: the file does not say.
     """
@@ -114,14 +114,12 @@ class StoredRollOut:
 
 
 def read_roll_out(path: str | Path) -> StoredRollOut:
-    """Read a file, a folder or a pattern of files. Raises RollOutFileError, one line with the file."""
+    """Read a file, a folder or a pattern of files. Raises RollOutFileError."""
     path = str(path)
     suffix = Path(path).suffix.lower()
     suffixes = (*_READERS, *MESH_SUFFIXES)
     if suffix not in suffixes and not (Path(path).is_dir() or "*" in path):
-        raise RollOutFileError(
-            f"{path}: unknown kind of roll-out: give one of {', '.join(suffixes)}, or a folder"
-        )
+        raise RollOutFileError(f"{path}: unknown kind: give one of {', '.join(suffixes)}, or a folder")
     try:
         return _check(_READERS.get(suffix, _meshes)(path))
     except Exception as error:  # a damaged file fails in nearly every way
@@ -130,12 +128,10 @@ def read_roll_out(path: str | Path) -> StoredRollOut:
 
 
 def _check(arrays: Mapping[str, Any]) -> StoredRollOut:
-    """Return the arrays, their shapes compared. Raises ValueError, without the file's name."""
+    """Return the arrays, shapes compared. Raises ValueError, without the file's name."""
     arrays = {name: np.asarray(array) for name, array in arrays.items() if array is not None}
     if "positions" not in arrays:
-        raise ValueError(
-            "holds no positions (T,V,3): name them 'positions' in an npz, 'pred' in a pickle"
-        )
+        raise ValueError("holds no positions (T,V,3): name them 'positions' in npz, 'pred' in pickle")
     series = {name: _floats(name, arrays[name]) for name in OVER_TIME if name in arrays}
     shape = series["positions"].shape
     for name, array in series.items():
@@ -208,7 +204,7 @@ def fit_to_scene(
     stored: StoredRollOut, scene: BuiltScene, *, units: str = "m", up: str = "y", fps: float | None = None,
     other_mesh: bool = False,
 ) -> StoredRollOut:  # fmt: skip
-    """Return the roll-out in metres, y up, once it has been shown to belong to the scene.
+    """Return the roll-out in metres, y up, once shown to belong to the scene.
 
     What its file does not state itself is given as in a RollOutOption.
 
@@ -245,10 +241,10 @@ def fit_to_scene(
 
 
 def _check_place(positions: np.ndarray, expected: np.ndarray, *, ordered: bool) -> None:
-    """Raise RollOutFileError unless the cloth (T,V,3) [m] starts at the expected place and goes its way.
+    """Raise RollOutFileError unless the cloth (T,V,3) [m] starts in place and goes its way.
 
-    A roll-out that explodes in the end is a result: the way counts in most of the frames. Of another mesh
-    the bounding boxes are compared.
+    A roll-out that explodes in the end is a result: the way counts in most frames before one that is not
+    finite. Of another mesh bounding boxes are compared.
     """
     first, size = positions[0], float(np.linalg.norm(np.ptp(expected[0], axis=0)))
     if not np.isfinite(first).all():
@@ -265,6 +261,8 @@ def _check_place(positions: np.ndarray, expected: np.ndarray, *, ordered: bool) 
             "vertices in the order of the scene's mesh"
         )
     frames = min(len(positions), len(expected))
+    finite = np.isfinite(positions[:frames]).all(axis=(1, 2))
+    frames = frames if finite.all() else int(finite.argmin())
     with np.errstate(over="ignore", invalid="ignore"):
         offsets = np.linalg.norm(positions[:frames].mean(axis=1) - expected[:frames].mean(axis=1), axis=1)
     strays = np.flatnonzero(~(offsets <= FARTHEST * size))
@@ -276,11 +274,11 @@ def _check_place(positions: np.ndarray, expected: np.ndarray, *, ordered: bool) 
 
 
 def _are_same_faces(theirs: np.ndarray, ours: np.ndarray) -> bool:
-    """Return whether two lists of triangles (F,3) join the same vertices, in any order and winding."""
+    """Return whether triangles (F,3) join the same vertices, in any order and winding."""
     one, other = (np.unique(np.sort(faces, axis=1), axis=0) for faces in (theirs, ours))
     return theirs.shape == ours.shape and np.array_equal(one, other)
 
 
 def expected_positions(scene: BuiltScene) -> np.ndarray:
-    """Return the garment skinned to the poses (T,V,3) [m]; without a body the start, (1,V,3)."""
+    """Return the skinned garment (T,V,3) [m]; without a body the start, (1,V,3)."""
     return scene.start[None] if scene.skinned is None else scene.skinned

@@ -62,7 +62,7 @@ quasi_static=(T,V,3), the answer to each pose held still, adds the method's own 
 
 
 def write_scene_files(part: Path, scene: BuiltScene, facts: dict[str, Any]) -> None:
-    """Write arrays, meshes and the facts, as scene.json, into a folder; README names each file's content."""
+    """Write arrays, meshes and scene.json, the facts, into a folder, as README says."""
     cloth, obstacle, dressed = scene.cloth, scene.obstacle, scene.dressed
     write_obj(part / "rest.obj", cloth.rest_positions, cloth.faces, cloth.rest_uv)
     pinned = scene.pin_positions
@@ -115,7 +115,7 @@ def write_motion(part: Path, dressed: Dressed) -> None:
 
 
 def facts_of(scene: BuiltScene) -> dict[str, Any]:
-    """Return sizes, step, material and terms with their constants of the scene, in SI units."""
+    """Return sizes, step, material, and terms with constants of the scene, in SI units."""
     material = scene.cloth.material
     return {
         "scene": scene.name,
@@ -138,13 +138,13 @@ def write_scene(
     folder: Path, declared: Scene, scene: BuiltScene, *, preset: str, simulation: Method | None,
     reader: str = "",
 ) -> None:  # fmt: skip
-    """Write a scene, as declared and as built by the sizes of a preset, into a new or empty folder.
+    """Write a scene, as declared and as built by a preset, into a new or empty folder.
 
-    The trajectory of `simulation` is written too, and what the method `reader` reads in a folder of its name.
+    So is the trajectory of `simulation`, and what the method `reader` reads, in a folder of its name.
 
     Raises:
         ValueError: where a reader's scene has no body.
-        RuntimeError: where the garment does not settle.
+        RuntimeError: the garment does not settle, or the simulation ends early.
     """
     with new_folder(folder) as part:
         facts = facts_of(scene) | {
@@ -157,6 +157,8 @@ def write_scene(
         if simulation is not None:
             simulation.prepare(scene)
             trajectory = simulation.run()
+            if trajectory.frames < scene.frames or trajectory.status == "diverged":
+                raise RuntimeError(f"{scene.name}: {trajectory.status}: {trajectory.reason}")
             trajectory.save(part / "reference.vtkhdf")
             positions, faces = trajectory.positions, trajectory.faces
             np.savez(part / "reference.npz", positions=positions, faces=faces, fps=1.0 / scene.dt)

@@ -63,7 +63,7 @@ class CollisionPostProcessing:
 
 @dataclass
 class Network(Method):
-    """Network read from its file; without one skinning, smoothed as much as in the networks' default recipe.
+    """Network read from its file; without one skinning, smoothed as by the default recipe.
 
     Features and joint transforms are made and the network is warmed up before run(). cleanup: whether
     each frame is post-processed; the body is then posed before run() too.

@@ -121,7 +121,7 @@ class HemMotion:
     hem: Array  # (H,) vertices
     simulated: Array  # (T,V,3) [m], world
     quasi_static: Array  # (T,V,3) [m], world
-    first: int = 0  # frame that is judged
+    first: int = 0  # evaluated frame
 
     def view_hem(self, positions: Array) -> Array:
         """Return the hem (T,H,3) [m] of positions (T,V,3) [m] in the axes of the root."""
@@ -213,7 +213,7 @@ DYNAMICS = Measurements(
          "factor of the least-squares fit of the hem's turn (or shift) to that of its own quasi-static "
          "solution, dynamics/lag frames earlier"),
         ("dynamics/lag", "frames", "Lag",
-         "frames by which the hem follows its own quasi-static solution"),
+         "frames by which the hem follows its own quasi-static solution, at most 12"),
         *((f"dynamics/common_{name}", "frames" if name == "lag" else "1", f"{title}, common",
            f"{title.lower()}, with every method's dynamic part taken from the simulator's answer to poses "
            "held still", {"table": "" if name in ("gain", "lag") else "dynamics"})

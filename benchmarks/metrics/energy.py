@@ -1,6 +1,6 @@
 """Metrics energy/*: every declared term at every frame, by the very terms that were minimised.
 
-Each method is judged on its own history: inertia compares a frame with the two before it in the same
+Each method is measured on its own history: inertia compares a frame with the two before it in the same
 trajectory, and contact planes are searched at the method's own positions. The first two frames have an
 inertia of 0. Means are over the frames after the warm-up.
 

@@ -215,7 +215,7 @@ GAP = Measurements(
          "energy of a frame above the minimum that a descent from this frame reaches, mean over frames",
          {"table": ""}),
         ("gap/refrozen", "J", "Refrozen gap",
-         "the same with contact planes searched at the frame in place of the step's first guess"),
+         "as the local gap, with contact planes searched at the frame instead of the step's first guess"),
         ("step/distance", "mm", "One-step distance",
          "root mean square distance between a frame and the local minimum of its own time step, mean over "
          "frames"),

@@ -1,8 +1,9 @@
-"""Metric own_excess/total: how far a method is from the minimum of the energies that it was trained on.
+"""Metric own_excess/total: mean of the energies that a method was trained on, above their simulation's.
 
-    100 (E(x) - E(y)) / (E(s) - E(y)) [%],    E the mean over the judged frames
+    100 (E(x) - E(y)) / (E(s) - E(y)) [%],    E the mean over the evaluated frames
 
-with x the method's roll-out, s the skinned garment, y the simulation that minimises E. Where E is the
+with x the method's roll-out, s the skinned garment, y the simulation with the energies of E. It minimises
+each step from its own past, so a roll-out may be below it. Where E is the
 energy of the scene, y is the reference and the number the relative excess. For a network that was trained
 on others (benchmarks.methods.own_energies) y is the simulation of these, started where the reference
 starts. Without inertia E is that of single frames, y the quasi-static solution.
@@ -29,7 +30,7 @@ NAME = "own_excess/total"
 
 
 def measure(roll_out: RollOut) -> dict[str, float]:
-    """Return the excess where the energies are not the scene's; 0 of what is a minimiser of its own ones."""
+    """Return the excess where the energies are not the scene's; 0 of their simulation."""
     group, recipe = roll_out.group, find_energies(roll_out.entry)
     bare = group.scene.skinned
     if bare is not None and (roll_out is group.reference or is_own_reference(roll_out.entry)):

@@ -68,8 +68,8 @@ def strains(cloth: Cloth, positions: np.ndarray) -> np.ndarray:
 
     term, finite = StretchStVK(cloth), np.isfinite(positions).all(axis=(1, 2))
     return np.array(
-        [term.value_and_gradient(np.ascontiguousarray(x))[0] if fine else np.inf
-         for x, fine in zip(positions, finite)]
+        [term.value_and_gradient(np.ascontiguousarray(x))[0] if is_finite else np.inf
+         for x, is_finite in zip(positions, finite)]
     )  # fmt: skip
 
 
@@ -95,7 +95,7 @@ EXTRAPOLATION = Measurements(
     metrics_of(
         ("motion/strain", "J", "Worst strain", "membrane energy of the worst frame"),
         ("motion/strain_ratio", "1", "Over the walk's",
-         "the same over that of the same method on the ordinary walk and cloth"),
+         "worst membrane energy over that of the same method on the ordinary walk and cloth"),
         ("motion/offset", "mm", "From skinning",
          "largest distance of a vertex from the skinned garment, over all frames", {"lower_is_better": None}),
         ("motion/penetration", "%", "Penetration", "vertices inside the body, mean over frames"),
@@ -113,7 +113,7 @@ LONG_ROLL_OUT = Measurements(
         ("roll_out/first", "J", "Energy, first",
          "strain, bending and inertia, mean over the frames of the early stretch"),
         ("roll_out/last", "J", "Energy, last",
-         "the same of the late stretch, which shows the same motion"),
+         "strain, bending and inertia, mean over the late stretch, which shows the same motion"),
         ("roll_out/drift", "mm", "Drift",
          "root mean square distance between the two stretches, about the pelvis"),
         table="roll_outs", lower_is_better=True,

@@ -1,4 +1,4 @@
-"""Metrics surface/*: a roll-out against the reference as surfaces, whatever their vertices and triangles.
+"""Metrics surface/*: a roll-out against the reference as surfaces, whatever their meshes.
 
 With d the distance from a vertex to the nearest point of the other surface, and theta the angle between
 the normals there, both weighted by a third of the triangles around the vertex,

@@ -1,6 +1,6 @@
 """Cell of a plan: one scene computed by one method with one seed.
 
-A process that runs cells loads this module, and not the plan: its reader loads what no scene needs.
+A process that runs cells loads this module, and not the plan, which loads what no scene needs.
 """
 
 from __future__ import annotations
@@ -8,6 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from benchmarks.method import MethodEntry
+from benchmarks.results.run_folder import cell_name, flat
 from benchmarks.scene import Scene
 
 TaskId = tuple[str, str]  # kind and name of a task
@@ -34,8 +35,8 @@ class Cell:
 
     @property
     def name(self) -> str:
-        """<scene>/<method>, and the seed where it is not 0: part of paths and of ids."""
-        return f"{flat(self.scene.name)}/{flat(self.method)}" + (f"-seed{self.seed}" if self.seed else "")
+        """Part of the paths of its files, and of ids."""
+        return cell_name(*self.key)
 
     @property
     def key(self) -> tuple[str, str, int]:
@@ -43,7 +44,7 @@ class Cell:
         return self.scene.name, self.method, self.seed
 
     def id(self, kind: str = "cell", number: int = 0) -> TaskId:
-        """Return the id of a task of the cell: cell, batch, metrics, or the repeat of that number, from 1."""
+        """Return the id of a task of the cell: cell, batch, metrics, or repeat, from 1."""
         return kind, self.name + (f"-{number}" if number else "")
 
     @property
@@ -53,14 +54,5 @@ class Cell:
 
 
 def id_of(kind: str, scene: Scene) -> TaskId:
-    """Return the id of a task of a scene: start, which settles its garment, or quasi-static."""
+    """Return the id of a task of a scene: start, or quasi-static."""
     return kind, flat(scene.name)
-
-
-def flat(name: str) -> str:
-    """Return a name as part of a path.
-
-    >>> flat("tshirt/walk")
-    'tshirt-walk'
-    """
-    return name.replace("/", "-")

@@ -1,4 +1,4 @@
-"""Which scenes meet which methods in a study: its cells; beside them its known answers."""
+"""Which scenes meet which methods in a study: its cells; and its known answers."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ PLACES = re.compile(r"\{(motion|swinging)(?: (\d+))?\}")
 
 @dataclass(frozen=True)
 class ReadStudy:
-    """A study with names in place of files, and all of project and user that it could name."""
+    """A study without files, and all of project and user that it could name."""
 
     study: Study
     inputs: Inputs
@@ -37,16 +37,17 @@ class ReadStudy:
 
 
 def choose_cells(scope: ReadStudy) -> tuple[tuple[Cell, ...], tuple[Case, ...]]:
-    """Return the cells and cases that a study names: the product of its scenes and methods, part by part.
+    """Return the cells and cases of a study: the product of its scenes and methods, by part.
 
     Raises:
-        StudyError: a word that names nothing, a choice of nothing, a roll-out that cannot take part.
+        StudyError: a word or a choice of nothing, a roll-out that cannot take part.
     """
     study = scope.study
     _check_words(scope)
     chosen: dict[tuple[str, str, int], Cell] = {}
     for name, scenes in scenes_of_parts(scope).items():
-        methods = matching(scope.methods, study.methods or study.parts[name].methods)
+        usual = matching(scope.methods, study.parts[name].methods)
+        methods = choose(scope.methods, study.methods, usual)
         pairs = ((scope.scenes[scene], scope.methods[method]) for scene in scenes for method in methods)
         for scene, entry in (pair for pair in pairs if pair[1].is_meant_for(pair[0])):
             one_seed = bool(matching([entry.name], study.one_seed))
@@ -62,7 +63,7 @@ def choose_cells(scope: ReadStudy) -> tuple[tuple[Cell, ...], tuple[Case, ...]]:
             f"{', '.join(study.parts)} (some are for networks alone); see --list, or name another study"
         )
     stored = roll_out_cells(study, tuple(chosen.values()), scope.methods)
-    # The reference first: an error against it can be said as soon as another cell is done.
+    # The reference first: errors against it are known when another cell is done.
     places = {name: place for place, name in enumerate(scope.scenes)}
     order = {name: place for place, name in enumerate((*scope.methods, *study.rollouts))}
     unsorted = (*chosen.values(), *stored)
@@ -73,7 +74,7 @@ def choose_cells(scope: ReadStudy) -> tuple[tuple[Cell, ...], tuple[Case, ...]]:
 
 
 def find_own_references(chosen: Mapping[tuple[str, str, int], Cell]) -> dict[tuple[str, str, int], Cell]:
-    """Return the simulations of methods' own energies, in scenes where the reference runs and these count."""
+    """Return simulations of methods' own energies, where the reference runs and these count."""
     compared = {c.scene.name for c in chosen.values() if c.entry.role == "reference"}
     added = {}
     for cell in chosen.values():
@@ -85,7 +86,7 @@ def find_own_references(chosen: Mapping[tuple[str, str, int], Cell]) -> dict[tup
 
 
 def matching(names: Iterable[str], patterns: Sequence[str]) -> list[str]:
-    """Return the names that some pattern means, without those that one beginning with ! means.
+    """Return the names that a pattern means, without those of one that begins with !.
 
     >>> matching(["snug", "snug-no-noise", "snug+cleanup"], ["snug*", "!*+*"])
     ['snug', 'snug-no-noise']
@@ -93,6 +94,16 @@ def matching(names: Iterable[str], patterns: Sequence[str]) -> list[str]:
     excluded = [pattern[1:] for pattern in patterns if pattern.startswith("!")]
     included = [pattern for pattern in patterns if not pattern.startswith("!")] or ["*"] * bool(excluded)
     return [name for name in names if _means(name, included) and not _means(name, excluded)]
+
+
+def choose(names: Iterable[str], patterns: Sequence[str], usual: list[str]) -> list[str]:
+    """Return the names that patterns mean; without any, or of ! alone, those of `usual`.
+
+    >>> choose(["a", "b", "c"], ["!b"], ["a", "b"])
+    ['a']
+    """
+    wanted = any(not pattern.startswith("!") for pattern in patterns)
+    return matching(names if wanted else usual, patterns) if patterns else usual
 
 
 def _means(name: str, patterns: Sequence[str]) -> bool:
@@ -106,13 +117,12 @@ def scenes_of_parts(scope: ReadStudy) -> dict[str, list[str]]:
     """
     scenes, patterns, parts = scope.scenes, scope.study.scenes, scope.study.parts
     usual = {name: matching(scenes, expand(part.scenes, scope.motions)) for name, part in parts.items()}
-    if not patterns:
-        return usual
     extras = {n: matching(scenes, expand(p.optional_scenes, scope.motions)) for n, p in parts.items()}
     listed = {name for group in (usual, extras) for names in group.values() for name in names}
-    chosen = {n: matching(dict.fromkeys((*usual[n], *extras[n])), patterns) for n in parts}
-    strays = [p for p in patterns if p in scenes or p.startswith("!") or not matching(listed, [p])]
-    for name in matching(scenes, strays) if set(strays) - listed else ():
+    chosen = {n: choose(dict.fromkeys((*usual[n], *extras[n])), patterns, usual[n]) for n in parts}
+    wanted = [p for p in patterns if not p.startswith("!")]
+    strays = [p for p in wanted if p in scenes or not matching(listed, [p])]
+    for name in matching(matching(scenes, strays), patterns) if set(strays) - listed else ():
         scene = scenes[name]
         of_split = scene.dressed and scene.motion in scope.motions.pick_motions(scene.garment)
         homes = [part for part in parts if scene.part in {scenes[n].part for n in usual[part]}]
@@ -123,7 +133,7 @@ def scenes_of_parts(scope: ReadStudy) -> dict[str, list[str]]:
 
 
 def expand(patterns: Sequence[str], motions: Motions) -> list[str]:
-    """Return the patterns of a part with garment and motions of a run in their places."""
+    """Return the patterns of a part with garment and motions of a run in place. Raises StudyError."""
     expanded = []
     for pattern in patterns:
         pattern = pattern.replace("{garment}", motions.garments[0].garment)
@@ -132,9 +142,11 @@ def expand(patterns: Sequence[str], motions: Motions) -> list[str]:
             continue
         garment = pattern.partition("/")[0].removeprefix("!")
         roles = motions.roles(dynamic=True) if place[1] == "swinging" else motions.by_role(garment)
-        names = roles[motions.split][: motions.few]
-        if place[2]:
-            names = names[int(place[2]) - 1 : int(place[2])]
+        names, number = roles[motions.split], int(place[2] or 1)
+        if place[2] and not 1 <= number <= len(names):
+            raise StudyError(f"{pattern}: there are {len(names)} such motions, counted from 1")
+        names = names[: motions.few]
+        names = names[number - 1 : number] if place[2] else names
         expanded += [pattern.replace(place[0], name) for name in names]
     return expanded
 
@@ -142,7 +154,7 @@ def expand(patterns: Sequence[str], motions: Motions) -> list[str]:
 def _time_once(cells: Sequence[Cell]) -> list[Cell]:
     """Return the cells; of a garment's whole motions the first alone keeps its costs.
 
-    Timed cells run one by one, the others side by side. What a frame costs, one motion tells.
+    Timed cells run one by one, others side by side. What a frame costs, one motion tells.
     """
     untimed = tuple(m.name for m in pick_measured(None) if m.name != "cost")
     begun: dict[str, Scene] = {}
@@ -164,7 +176,7 @@ def _cases(study: Study, cases: Sequence[Case]) -> Iterator[Case]:
         part = study.parts.get(case.suite, Part())
         sets = {"{smoke}": case.smoke and not case.long, "{short}": not case.long}
         names = [case.name if sets.get(word) else word for word in part.cases]
-        if part.cases and matching([case.name], study.scenes or names):
+        if choose([case.name], study.scenes if part.cases else (), matching([case.name], names)):
             yield case
 
 
@@ -193,7 +205,7 @@ def _check_words(scope: ReadStudy) -> None:
 
 
 def _check_user_scenes(scenes: Sequence[Scene], motions: Motions) -> None:
-    """Raise StudyError for a start or a motion that a user's scene names and nobody knows."""
+    """Raise StudyError for an unknown start or motion of a user's scene."""
     starts = (*dress_scenes(motions.garments[0].garment), *scenes)
     settling = [scene.name for scene in starts if scene.simulated and not scene.start_of]
     for scene in (scene for scene in scenes if scene.declared_in):
@@ -205,7 +217,7 @@ def _check_user_scenes(scenes: Sequence[Scene], motions: Motions) -> None:
 
 
 def roll_out_cells(study: Study, cells: Sequence[Cell], methods: Mapping[str, MethodEntry]) -> list[Cell]:
-    """Return the cells of stored roll-outs: each meets the scenes for which it has a file, in their parts.
+    """Return the cells of stored roll-outs: each meets the scenes for which it has a file.
 
     Raises:
         StudyError: a name that a method has, or a file of one scene where several are asked for.

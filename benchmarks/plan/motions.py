@@ -23,8 +23,7 @@ class Motions:
     """Names of the motions of a run by their roles.
 
     files: those that came from a user's files. garments: those of the run; the first is that of a run
-    where none is named. split: the role whose motions stand in the suites' scenes, "test" or
-    "validation".
+    where none is named. split: role whose motions stand in the suites' scenes, "test" or "validation".
     few: so many of them, the first, stand there; None: all.
     dynamic: of garments that swing, those that validate, and test.
     """
@@ -49,7 +48,7 @@ class Motions:
         return self.roles()[self.split][: self.few]
 
     def role_of(self, motion: str) -> str:
-        """Return its role: "training", "validation", "test", or empty where it has none in this run."""
+        """Return its role: "training", "validation", "test", or empty."""
         for role in ("test", "validation", "train"):
             if motion in (*self.roles()[role], *self.roles(dynamic=True)[role]):
                 return "training" if role == "train" else role
@@ -68,13 +67,11 @@ def split_motions(study: Study, files: Collection[str] = ()) -> Motions:
     """Return which motions train, validate and test; `files` are those of a user's files.
 
     Where the study names none, those of the library test and validate, and of files alone the first in
-    the order of names tests. The library takes part where it is named among the motions, or where no file
-    is.
+    the order of names tests. The library takes part where motions name it, or no file.
 
     Validation and test motions of the library never train, and its test motions never validate: where a
-    part of a recorded clip is measured, no other part of that clip trains. Where nothing is left to train
-    on, the library trains. Test clips of a published split test, unless the study names others, and never
-    train.
+    part of a recorded clip is measured, no other part of it trains. Where nothing is left, the library
+    trains. Test clips of a published split test, unless the study names others, and never train.
 
     Raises:
         StudyError: a name that no motion has, or a split without motions.

@@ -34,11 +34,11 @@ from snug.file_options import split_words
 
 PROGRAM = "benchmarks.run"
 EXAMPLES = """examples:
-  python -m benchmarks.run                                    study default: all of it, small
-  python -m benchmarks.run full                               more motions, trainings, solvers and scenes
-  python -m benchmarks.run smoke                              everything once, tiny, about 2 minutes
-  python -m benchmarks.run full:garments -o reports/runs/mine       one part of a study
-  python -m benchmarks.run ./mine.toml --set sizes.frames=60        a study of your own (docs/run.md)
+  python -m benchmarks.run            study default: all of it, small
+  python -m benchmarks.run full       more motions, trainings, solvers and scenes
+  python -m benchmarks.run smoke      everything once, tiny, about 2 minutes
+  python -m benchmarks.run full:garments -o reports/runs/mine    one part of a study
+  python -m benchmarks.run ./mine.toml --set sizes.frames=60     a study of your own (docs/run.md)
   python -m benchmarks.run --scenes 'tshirt/*' --methods ./mine.py,snug,simulation --seeds 0,1,2
   python -m benchmarks.run --motions mocap.bvh,up=z --garment shirt.obj,units=cm --body mine.npz
 
@@ -87,7 +87,7 @@ def make_parser() -> argparse.ArgumentParser:
 
 
 def add_options(parser: argparse.ArgumentParser, short: Sequence[str] = OF_SCENES) -> None:
-    """Add --set and the short forms of these fields; those of a scene are the same in every command."""
+    """Add --set and short forms of these fields; every command has those of a scene."""
     texts = attributes_of(Study)
     parser.add_argument("--set", action="append", default=[], metavar="FIELD=VALUE", dest="settings",
         help="another value of a field of the study, as split=validation or sizes.frames=60; repeatable"
@@ -106,7 +106,7 @@ def study_of(options: argparse.Namespace, name: str = "full") -> Study:
 
 
 def _tables(options: argparse.Namespace) -> Iterator[Table]:
-    """Yield the fields that short forms give; words behind the path of motions are field motion_files."""
+    """Yield the fields of short forms; words behind a path of motions are motion_files."""
     for field in SHORT:
         value: Any = getattr(options, field, None)
         if not value:
@@ -119,13 +119,13 @@ def _tables(options: argparse.Namespace) -> Iterator[Table]:
             value = [path for path, _ in paths]
             tables = [table for path, table in paths if path != LIBRARY] or [{}]
             if any(table != tables[0] for table in tables):
-                raise StudyError(
-                    "motions: words behind a path hold for all files: give each path the same"
-                )
+                raise StudyError("motions: words behind a path hold for all files: give each the same")
             if tables[0]:
                 yield option("motion_files", tables[0])
         elif field == "rollouts":
-            value = dict(map(parse_roll_out, value))
+            pairs = list(map(parse_roll_out, value))
+            if len(value := dict(pairs)) < len(pairs):
+                raise StudyError(f"--rollout: {', '.join(n for n, _ in pairs)}: give each its own name")
         elif field not in SINGLE:
             parts = (part.strip() for text in value for part in text.split(","))
             value = list(filter(None, parts))
@@ -135,7 +135,7 @@ def _tables(options: argparse.Namespace) -> Iterator[Table]:
 
 
 def list_names(study: Study, word: str = "") -> str:
-    """Return what can be named, a line each: all with `word` in their names, else an overview of a screen.
+    """Return what can be named, a line each: all with `word` in their names, else an overview.
 
     Every scene and method can be named in every study. Those that take part without being named are those
     of the given study. A word may be a pattern. Raises StudyError where no name has it.

@@ -20,7 +20,7 @@ from benchmarks.plan import user_files
 from benchmarks.plan.cell import Cell, TaskId
 from benchmarks.plan.choose_cells import ReadStudy, choose_cells
 from benchmarks.plan.motions import Motions, split_motions
-from benchmarks.plan.study import Study, StudyError
+from benchmarks.plan.study import Study, StudyError, nearest
 from benchmarks.presets import find_preset
 from benchmarks.provenance import usable_cores
 from benchmarks.results.protocol import NUMBER, OWN
@@ -31,6 +31,7 @@ from benchmarks.scenes import GarmentScenes, all_scenes
 from benchmarks.validation.case import Case
 from benchmarks.validation.registry import CASES
 from reference_sim.files.atomic_files import demand_writable_folder
+from snug.kinds import KINDS
 from snug.motion.library import TRAIN
 
 
@@ -110,7 +111,7 @@ class Plan:
 
     @property
     def cut_motions(self) -> dict[str, str]:
-        """Motion of a user's file -> which of its frames are measured, where these are not all."""
+        """Motion of a user's file -> which of its frames are measured, if not all."""
         limit = self.study.sizes.frames
         return {
             name: f"the first {limit} of {motion.frames} frames"
@@ -119,16 +120,18 @@ class Plan:
         }
 
     def open_assets(self) -> Assets:
-        """Make body, garments and motions of the scenes. Raises ValueError where one cannot be made."""
-        user_motions, train = self.inputs.motions, self.motions.train
-        names = [scene.motion for scene in self.scenes if scene.dressed]
-        for garment in self.garments:
-            names += self.motions.pick_motions(garment)
-        names += train if self.networks else ()
-        names = list(dict.fromkeys(names))
-        motions = [user_motions[name] for name in names if name in user_motions]
-        motions += make_motions(name for name in names if name not in user_motions)
-        return open_assets(self.study.sizes, motions, self.garments, inputs=self.inputs, training=train)
+        """Make body, garments and all motions of a run. Raises ValueError."""
+        train = self.motions.train
+        names = [name for garment in self.garments for name in self.motions.pick_motions(garment)]
+        return self.open_some([*names, *(train if self.networks else ())], training=train)
+
+    def open_some(self, motions: Sequence[str] = (), **fields: Any) -> Assets:
+        """Make body, garments and motions of the scenes, and `motions`; fields: of `open_assets`."""
+        user_motions = self.inputs.motions
+        names = dict.fromkeys([*(scene.motion for scene in self.scenes if scene.dressed), *motions])
+        made = [user_motions[name] for name in names if name in user_motions]
+        made += make_motions(name for name in names if name not in user_motions)
+        return open_assets(self.study.sizes, made, self.garments, inputs=self.inputs, **fields)
 
 
 def runs(cell: Cell) -> bool:
@@ -146,10 +149,9 @@ def network_of(cell: Cell) -> Network | None:
 
 
 def protocol_of(cell: Cell, plan: Plan) -> str:
-    """Return the protocol of a cell's rows: its number, or OWN where scene or settings are a user's.
+    """Return the protocol of a cell's rows: NUMBER, or OWN where scene or settings are a user's.
 
-    Settings are the preset, the body, the garment with its material, the motion, the reference, and what
-    the project's own networks train on.
+    Settings: preset, body, garment with its material, motion, reference, and what our networks train on.
     """
     scene, inputs, sizes = cell.scene, plan.inputs, plan.study.sizes
     from_user = scene.dressed and (inputs.body or scene.motion in inputs.motions)
@@ -166,7 +168,7 @@ def protocol_of(cell: Cell, plan: Plan) -> str:
 
 
 def protocol_of_case(scene: str, metric: str) -> str:
-    """Return the protocol of a row that no cell gives: OWN of a case that is not the project's."""
+    """Return the protocol of a row of a case: OWN where it is a user's."""
     listed = any(scene == case.name or (scene, metric) == (case.scene, case.metric) for case in CASES)
     return NUMBER if listed else OWN
 
@@ -175,13 +177,13 @@ _declared_with = cache(all_scenes)  # motions and swinging motions
 
 
 def _is_declared(scene: Scene, preset: str) -> bool:
-    """Return whether the project declares the scene so; a run may leave out what is measured in it."""
+    """Return whether the project declares the scene so, but for what is measured in it."""
     motions = (scene.motion,) * bool(scene.motion)
     ours = _declared_with(motions, motions).get(scene.name)
     return ours is not None and replace(ours.at(find_preset(preset)), metrics=scene.metrics) == scene
 
 
-# the same everywhere, so that seconds of two runs can be compared; fewer cores, fewer workers
+# everywhere, so that seconds of two runs can be compared; fewer where cores are fewer
 WORKERS = 2
 
 
@@ -200,8 +202,7 @@ def make_plan(
     are further ones that no file declares.
 
     Raises:
-        ValueError: one line for the first thing that cannot be met, with what there is instead. Nothing
-            has been created then.
+        ValueError: one line for the first thing that cannot be met, with a remedy; nothing is created.
 
     >>> from benchmarks.plan.study import option, read_study
     >>> study = read_study("full", [option("scenes", "flag"), option("methods", "simulation")])
@@ -238,11 +239,13 @@ def read_files(study: Study, scenes: Sequence[Scene] = ()) -> ReadStudy:
     study, user_scenes, user_methods, user_cases = user_files.declarations_of(study)
     garment, self_contact = study.garment, study.self_contact
     if garment and garment.name in {name.split("/")[0] for name in all_scenes("-", "-")}:
-        raise StudyError(
-            f"{garment.path}: the project has scenes of that name: give the file another name"
-        )
+        raise StudyError(f"{garment.path}: the project has scenes of that name: give the file another")
     if self_contact and not is_installed("ipctk"):
         raise StudyError("self_contact: needs the package ipctk: pip install ipctk")
+    networks = [*TRAININGS, *KINDS, *(entry.trained for entry in user_methods if entry.trained)]
+    for name in study.sizes.steps:
+        if name not in networks:
+            raise StudyError(f"sizes.steps.{name}: no training is called so; {nearest(name, networks)}")
     inputs = read_inputs(study.body, garment, study.motions, study.motion_files)
     motions = split_motions(study, inputs.motions)
     of_file = [GarmentScenes(garment.name, f"a garment of {garment.path.name}")] if garment else []
@@ -272,7 +275,7 @@ def choose_metrics(study: Study) -> tuple[str, ...]:
 
 
 def check_machines(study: Study, folder: Path, scheduler: str) -> None:
-    """Raise ValueError for a device that this machine lacks, for networks of no folder, or of the run's own.
+    """Raise ValueError for an absent device, for networks of no folder, or of the run's own.
 
     Where a cluster works, also for what this machine alone has.
     """

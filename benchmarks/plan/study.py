@@ -6,6 +6,7 @@ Every field is an attribute of a dataclass, whose type says what it takes.
 from __future__ import annotations
 
 import difflib
+import math
 import re
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -22,14 +23,12 @@ from snug.file_options import GarmentFile, MotionFileOptions
 from snug.trained import FOLDER
 
 PARTS = ("garments", "speed", "validation", "extremes", "shapes")  # that reports know
-
-
-# Fields of sizes.
-COUNTS = ("garment_vertices", "train_motions", "test_motions", "clip_frames", "sheet_cells", "repeats")
+# Least values of sizes where they are not 1.
+LEAST = {"frames": FEWEST_FRAMES, "warm_up_frames": 0, "simulated_mixed": 0}
 
 
 class StudyError(ValueError):
-    """A field of a study that cannot be meant; the message names its place and what there is instead."""
+    """A field of a study that cannot be meant; the message has its place and a remedy."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,16 +36,15 @@ class Part:
     """Scenes that meet methods, and known answers; its name is the column `suite` of its rows.
 
     A pattern has `*`, `?` or `[..]`; one that begins with `!` takes names out. In scenes, {garment}
-    stands for the first garment, {motion} for each measured motion of a scene's garment, {motion 1} for
-    the first of them, {swinging 1} for the first of a garment that swings.
+    stands for the first garment, {motion} behind a garment's whole name for each motion measured in it,
+    {motion 1} for the first of them, {swinging 1} for the first of a garment that swings.
 
     Attributes:
         question: what it answers, one line.
         scenes: names, patterns and files of scenes.
         optional_scenes: those that take part only where field `scenes` of the study names them.
         methods: names, patterns and files of methods.
-        cases: names, patterns and files of known answers; {smoke} for those marked so, {short} for all
-            but long.
+        cases: names, patterns and files of known answers; {smoke}: those marked so, {short}: not long.
     """
 
     question: str = ""
@@ -139,21 +137,23 @@ class Study:
             raise StudyError(f"seeds: '{seeds}': give {remedy}")
         if len(set(self.seeds)) < len(self.seeds):
             raise StudyError(f"seeds: {self.seeds}: give each once")
-        if self.sizes.frames < FEWEST_FRAMES:
-            raise StudyError(f"sizes.frames: {self.sizes.frames}: give {FEWEST_FRAMES} or more")
-        counts = {name: getattr(self.sizes, name) for name in COUNTS}
-        counts |= {f"steps.{name}": steps for name, steps in self.sizes.steps.items()}
-        for name, count in counts.items():
-            if count is not None and count < 1:
-                raise StudyError(f"sizes.{name}: {count}: give 1 or more")
+        sizes = vars(self.sizes) | {f"steps.{name}": n for name, n in self.sizes.steps.items()}
+        sizes |= {f"dependence.{name}": size for name, size in vars(self.sizes.dependence).items()}
+        for name, size in sizes.items():
+            number = min(size, default=1) if isinstance(size, tuple) else size
+            least = LEAST.get(name, 1)
+            if isinstance(number, int) and number < least:
+                raise StudyError(f"sizes.{name}: {number}: give {least} or more")
+            if isinstance(number, float) and not 0.0 < number < math.inf:
+                raise StudyError(f"sizes.{name}: {number}: give a number above 0")
         for name in self.parts:
             if name not in PARTS and not self.parts[name].question:
                 remedy = f"choose from {', '.join(PARTS)}, or give it a question"
                 raise StudyError(f"parts.{name}: no part is called so; {remedy}")
 
 
-def nearest(word: str, names: Sequence[str], otherwise: str = "see --list") -> str:
-    """Return the names that a wrong word may have meant, as the end of a message."""
+def nearest(word: str, names: Sequence[str], otherwise: str = "see benchmarks.run --list") -> str:
+    """Return the names that a wrong word may have meant, as a message's end."""
     matches = difflib.get_close_matches(word, names, n=3, cutoff=0.5)
     return f"did you mean {' or '.join(matches)}?" if matches else otherwise
 
@@ -166,6 +166,7 @@ HIDDEN = {Study: ("written",), Preset: ("name", "description"), RollOutOption: (
 # Table -> the field that a word in its place means.
 WORDS_FOR_TABLES = {"garment": "path", "sizes": "base"}
 PATHS = ("body", "trained", "motions", "path", "material")  # fields that hold paths
+OF_CODE = ("scenes", "optional_scenes", "methods", "metrics", "cases")  # and those that may name files
 KINDS = {str: "text", int: "a whole number", float: "a number", bool: "true or false"}
 Table = Mapping[str, Any]
 
@@ -179,7 +180,7 @@ def read_study(word: str = "full", options: Sequence[Table] = ()) -> Study:
         options: see `option`; later ones hold before earlier ones.
 
     Raises:
-        StudyError: no such study, or a field that cannot be meant, with what is near it.
+        StudyError: no such study, or a field that cannot be meant.
 
     >>> read_study("full:speed", [option("seeds", [1, 2])]).seeds
     (1, 2)
@@ -199,7 +200,7 @@ def read_study(word: str = "full", options: Sequence[Table] = ()) -> Study:
 
 
 def read_fields(kind: type, path: Path) -> Any:
-    """Return an object of a dataclass from a TOML file. Raises StudyError with file, line and field."""
+    """Return a dataclass from a TOML file. Raises StudyError with file, line and field."""
     table = _read_table(path)
     try:
         return _dataclass_of(kind, table)
@@ -221,11 +222,12 @@ def find_study(name: str) -> Path:
 
 
 def locate(message: str, study: str, options: Sequence[str]) -> str:
-    """Return the message of a faulty field behind the file and line of the study that give it.
+    """Return the message of a faulty field behind the file and line that give it.
 
     A field that the words of the command line give has none.
     """
-    names = {word.partition("=")[0].lstrip("-").replace("-", "_") for word in options}
+    words = (word.removeprefix("--set=").partition("=")[0] for word in options)
+    names = {word.lstrip("-").replace("-", "_") for word in words}
     field = message.partition(":")[0]
     if field in names or not re.fullmatch(r"[\w.]+", field):
         return message
@@ -252,11 +254,9 @@ def _line_of(path: Path, field: str) -> str:
 
 
 def study_names() -> list[str]:
-    """Return the names of the package's studies, and of those with code that lie beside it."""
-    with_code = {
-        path.parent.name: None for folder in FOLDERS for path in sorted(folder.glob(f"*/{FILE}"))
-    }
-    return [*(path.stem for path in sorted(PACKAGED.glob("*.toml"))), *with_code]
+    """Return the names of the package's studies, and of those with code."""
+    folders = [path.parent.name for folder in FOLDERS for path in sorted(folder.glob(f"*/{FILE}"))]
+    return [*(path.stem for path in sorted(PACKAGED.glob("*.toml"))), *dict.fromkeys(folders)]
 
 
 def option(field: str, value: Any) -> Table:
@@ -304,8 +304,8 @@ def _read_table(path: Path) -> dict[str, Any]:
 
 
 def _fields_of(path: Path, chain: tuple[Path, ...] = ()) -> Table:
-    """Return the fields of a file and, below them, of the study that it is like, and so on."""
-    if path in chain:
+    """Return the fields of a file and, below them, of the study that it is like."""
+    if path.resolve() in chain:
         raise StudyError(f"{path}: is like itself")
     table = _with_tables(_read_table(path))
     if path.parent != PACKAGED:
@@ -315,7 +315,7 @@ def _fields_of(path: Path, chain: tuple[Path, ...] = ()) -> Table:
     like = str(table.pop("like"))
     sibling = path.parent / like
     base = sibling if sibling.is_file() else find_study(str(sibling) if sibling.is_dir() else like)
-    return _merge(_fields_of(base, (*chain, path)), table)
+    return _merge(_fields_of(base, (*chain, path.resolve())), table)
 
 
 def _resolve(folder: Path, name: str, value: Any) -> Any:
@@ -324,24 +324,27 @@ def _resolve(folder: Path, name: str, value: Any) -> Any:
         return {name: _resolve(folder, name, item) for name, item in value.items()}
     if isinstance(value, list):
         return [_resolve(folder, name, item) for item in value]
-    is_path = isinstance(value, str) and (name in PATHS or value.endswith(".py")) and value != LIBRARY
-    return str(folder / value) if is_path else value
+    if not isinstance(value, str) or value == LIBRARY:
+        return value
+    is_code = name in OF_CODE and value.endswith(".py") and not value.startswith("!")
+    return str(folder / value) if is_code or name in PATHS else value
 
 
 def _with_tables(table: Table) -> dict[str, Any]:
     """Return the fields with a table for each word that may stand in place of one."""
-    keys = {name: WORDS_FOR_TABLES[name] for name in WORDS_FOR_TABLES if isinstance(table.get(name), str)}
-    table = {**table, **{name: {field: table[name]} for name, field in keys.items()}}
+    words = {n: {key: table[n]} for n, key in WORDS_FOR_TABLES.items() if isinstance(table.get(n), str)}
+    table = {**table, **words}
     if isinstance(files := table.get("rollouts"), Mapping):
         table["rollouts"] = {n: {"path": v} if isinstance(v, str) else v for n, v in files.items()}
     return table
 
 
 def _merge(below: Table, above: Table) -> dict[str, Any]:
-    """Return the fields of both; tables are joined, all else is that of `above`."""
+    """Join tables; where `above` has a field, or a table with a file or base, it counts alone."""
     merged = {**below, **above}
     for name, value in above.items():
-        if isinstance(value, Mapping) and isinstance(below.get(name), Mapping):
+        tables = isinstance(value, Mapping) and isinstance(below.get(name), Mapping)
+        if tables and not any(isinstance(value.get(key), str) for key in WORDS_FOR_TABLES.values()):
             merged[name] = _merge(below[name], value)
     return merged
 
@@ -351,7 +354,7 @@ def _refuse(field: Sequence[str], message: object) -> NoReturn:
 
 
 def _dataclass_of(kind: Any, table: Any, field: tuple[str, ...] = ()) -> Any:
-    """Return an object of a dataclass from the table of its fields; what it refuses gets its place."""
+    """Return a dataclass from the table of its fields; what it refuses gets its place."""
     table = _table(table, field)
     if kind is RollOutOption:
         table["name"] = field[-1]

@@ -1,7 +1,6 @@
 """Methods, scenes, metrics and known answers that a user's file declares.
 
-A file is named by its path, which means all that it declares. Entries carry the file that they come from,
-so that every process can load it.
+A file is named by its path, which means all that it declares. Entries carry it for other processes.
 """
 
 from __future__ import annotations
@@ -20,10 +19,11 @@ from benchmarks.metric import Metric
 from benchmarks.metrics import MEASUREMENTS
 from benchmarks.plan.study import Part, Study
 from benchmarks.provenance import digest, find_imports, find_module
+from benchmarks.results.run_folder import NOT_TAKEN
 from benchmarks.scene import Scene
 from benchmarks.validation.case import Case, cases_of
 
-NAME = re.compile(r"(?!body$|.*quasi-static$)[A-Za-z0-9_][A-Za-z0-9_+./@:-]{0,149}")  # it names files
+NAME = re.compile(NOT_TAKEN + r"[A-Za-z0-9_][A-Za-z0-9_+./@:-]{0,149}")  # it names files
 
 
 class Kind(NamedTuple):
@@ -44,7 +44,7 @@ OF_FIELD = {"scenes": SCENES, "optional_scenes": SCENES, "methods": METHODS, "ca
 
 
 def resolve(kind: Kind, names_and_paths: Sequence[str]) -> tuple[tuple[str, ...], list[Any]]:
-    """Return names, and the entries that files among them (*.py) declare, whose names stand in their places.
+    """Return names, and entries of files (*.py) among them, whose names take their places.
 
     Raises:
         DeclarationError: a file that cannot be read, or declares none.
@@ -55,11 +55,10 @@ def resolve(kind: Kind, names_and_paths: Sequence[str]) -> tuple[tuple[str, ...]
 
 
 def declarations_of(study: Study) -> tuple[Study, list[Scene], list[MethodEntry], list[Case]]:
-    """Read the files that a study names; a known answer belongs to the part that names its file.
+    """Read the files of a study; a known answer belongs to the part that names its file.
 
     Returns:
-        The study with names in place of files, and the scenes, methods and known answers that they
-        declare.
+        The study with names in place of files, and the scenes, methods and known answers of these.
 
     Raises:
         DeclarationError: a file that cannot be read, or declares none.
@@ -81,7 +80,7 @@ def declarations_of(study: Study) -> tuple[Study, list[Scene], list[MethodEntry]
 
 
 def check_networks(entries: Sequence[MethodEntry]) -> None:
-    """Raise DeclarationError where two trainings have one name: one network would be the other's."""
+    """Raise DeclarationError where two trainings have one name."""
     trainings = dict(TRAININGS)
     for entry in (entry for entry in entries if entry.trained is not None):
         place, name = f"{entry.declared_in}: method '{entry.name}'", str(entry.trained)
@@ -113,10 +112,8 @@ def entries_of(kind: Kind, home: str) -> list[Any]:
         entries = [replace(entry, declared_in=home) for entry in items]
     else:
         entries = [_complete(kind, entry, home) for entry in items]
-    needs_function = home in {getattr(entry, "module", home) for entry in entries}
-    _demand(
-        not needs_function or hasattr(module, kind.function), f"{home}: has no function {kind.function}"
-    )
+    needs = home in {getattr(entry, "module", home) for entry in entries}
+    _demand(not needs or hasattr(module, kind.function), f"{home}: has no function {kind.function}")
     return entries
 
 
@@ -148,12 +145,12 @@ def _demand(fine: object, otherwise: str) -> None:
 
 
 def import_file(home: str) -> ModuleType:
-    """Load the module of a file. Raises DeclarationError, with the line of the file at fault."""
+    """Load the module of a file. Raises DeclarationError, with the line at fault."""
     try:
         module = load(home)
     except (DeclarationError, KeyboardInterrupt):
         raise
-    except BaseException as error:  # whatever a user's file raises, also what usually ends a program
+    except BaseException as error:  # whatever a user's file raises, also SystemExit
         fault = error.msg if isinstance(error, SyntaxError) else f"{type(error).__name__}: {error}"
         place = raised_at(error, home) or home
         raise DeclarationError(f"{place}: {' '.join(fault.split())}") from None

@@ -14,7 +14,7 @@ from reference_sim.given_files import demand_file
 
 
 class ResultsError(ValueError):
-    """A run folder or one of its files is absent or not what it should be; the message names it."""
+    """A run folder or a file of it is absent or broken; the message names it."""
 
 
 def read_json(path: Path) -> dict[str, Any]:
@@ -57,21 +57,19 @@ class Row:
         expected, tolerance: of a validation case.
         uncertainty: noise of the value, of what the start of the reference changes, or its standard error
             as a sample of frames, in the unit of the value.
-        moved: change of the value by each member of the reference's family in its place, to four digits;
-            as JSON.
+        moved: change of the value by each of the reference's family in its place, 4 digits; as JSON.
         preset, commit, hardware, dtype, threads: origin.
         protocol: number of the protocol; `own` where scene, metric or settings are a user's.
         terms: energies of the scene, joined by `+`.
         garment, motion, part: of the scene; the part is `whole`, `clip`, `loop` or `start`.
         family, level: name shared by methods that differ by one number, and that number.
-        role: place of the method in tables and plots, such as `reference`, `solver`, `network` or
-            `baseline`.
+        role: place of the method in tables and plots, as `reference`, `solver`, `network`, `baseline`.
         base: method that this one varies or starts from.
         seeded: whether another seed gives another value.
         pairing_group: name shared by variants of one method, compared seed by seed.
 
     Raises:
-        ResultsError: an unknown status, a non-finite value called ok, or a skip without a reason.
+        ResultsError: unknown status, non-finite value called ok, or skip without a reason.
     """
 
     suite: str
@@ -119,7 +117,7 @@ class Row:
 
     @property
     def pretrained(self) -> str:
-        """Remark on the row's network where it is of a file; empty where there is none or it was trained."""
+        """Remark on the row's network where it is of a file; else empty."""
         remark = re.search(rf"(?:^|; )({PRETRAINED} .*)", self.reason)
         return remark[1] if remark else ""
 
@@ -130,7 +128,7 @@ _NO_FORMULA = re.compile(r"-|[+-]?[0-9.]+(e[+-]?[0-9]+)?")  # a dash, or a numbe
 
 
 def cell_text(text: str) -> str:
-    """Return a text for a cell of a CSV file, which no program that opens it takes for a formula.
+    """Return a text for a cell of a CSV file, which no program takes for a formula.
 
     >>> cell_text("=1+1"), cell_text("-"), cell_text("-0.5")
     ("'=1+1", '-', '-0.5')
@@ -141,7 +139,7 @@ def cell_text(text: str) -> str:
 
 
 def row_to_cells(row: Row) -> dict[str, str]:
-    """Return the text of each cell; numbers keep all their digits, so reading gives the same row."""
+    """Return the text of each cell: numbers with all digits, texts by single spaces and `cell_text`."""
     cells = {}
     for name in COLUMNS:
         value = getattr(row, name)

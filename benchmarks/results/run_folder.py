@@ -1,4 +1,4 @@
-"""The folder of a run: the place of each of its files; run.json, results.csv and frame_energies.csv."""
+"""The folder of a run: places of its files; run.json, results.csv, frame_energies.csv."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import gzip
 import json
 import math
 import os
+import zlib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -22,8 +23,25 @@ if TYPE_CHECKING:
 
 FORMAT = 4  # of run.json, results.csv and the cache; written into run.json
 OLD = "written by an earlier version of this project; run the benchmark again in a new folder"
-# Entries of run.json that make the scenes what they are: with others, two runs have no number in common.
+# Of run.json: with other such entries, two runs have no number in common.
 OF_SCENES = ("preset", "preset_values", "body", "garment")
+
+
+NOT_TAKEN = r"(?!body$|.*quasi-static$)"  # by the runner's own files: names of methods
+
+
+def flat(name: str) -> str:
+    """Return a name as part of a path.
+
+    >>> flat("tshirt/walk")
+    'tshirt-walk'
+    """
+    return name.replace("/", "-")
+
+
+def cell_name(scene: str, method: str, seed: int = 0) -> str:
+    """Return <scene>/<method>, and the seed where it is not 0: part of paths and of ids."""
+    return f"{flat(scene)}/{flat(method)}" + (f"-seed{seed}" if seed else "")
 
 
 def model_path(models: Path, kind: str, seed: int) -> Path:
@@ -32,7 +50,7 @@ def model_path(models: Path, kind: str, seed: int) -> Path:
 
 
 def find_file(path: Path) -> Path:
-    """Return the path of a file, or of its compressed copy, which a published run has in its place."""
+    """Return the path of a file, or of the compressed copy that a published run has."""
     copy = path.with_name(f"{path.name}.gz")
     return copy if copy.is_file() and not path.is_file() else path
 
@@ -60,9 +78,8 @@ class RunFolder:
         return path.relative_to(self.path).as_posix()
 
     def trajectory_path(self, scene: str, method: str, seed: int = 0) -> Path:
-        """Return trajectories/<scene>/<method>.vtkhdf; a slash, as in "tshirt/walk", becomes a hyphen."""
-        suffix = "" if seed == 0 else f"-seed{seed}"
-        return self.trajectories / scene.replace("/", "-") / f"{method.replace('/', '-')}{suffix}.vtkhdf"
+        """Return trajectories/<scene>/<method>.vtkhdf; a slash becomes a hyphen."""
+        return self.trajectories / f"{cell_name(scene, method, seed)}.vtkhdf"
 
     def quasi_static_path(self, scene: str, method: str = "", seed: int = 0) -> Path:
         """Return the path of a method's quasi-static solution, beside its trajectory.
@@ -72,7 +89,7 @@ class RunFolder:
         return self.trajectory_path(scene, f"{method}-quasi-static" if method else "quasi-static", seed)
 
     def curves_path(self, scene: str, method: str, seed: int = 0) -> Path:
-        """Return the path of metrics of each frame, beside the trajectory: name -> (T,) or (T,V)."""
+        """Return the path of curves of metrics: name -> (T,) or (T,V)."""
         return self.trajectory_path(scene, method, seed).with_suffix(".npz")
 
     def start_path(self, scene: str) -> Path:
@@ -91,14 +108,14 @@ class RunFolder:
             temporary.write_text(text + "\n", encoding="utf-8")
 
     def read_config(self) -> dict[str, Any]:
-        """Read run.json. Raises ResultsError where it is absent, broken, or of another format."""
+        """Read run.json. Raises ResultsError: absent, broken, or of another format."""
         config = read_json(self.config_path)
         if config.get("format") != FORMAT:
             raise ResultsError(f"{self.config_path}: {OLD}")
         return config
 
     def find_changes(self, digests: Mapping[str, str]) -> dict[str, str]:
-        """Return those of these files that are not as the run wrote them: name -> gone or damaged."""
+        """Return name -> gone or damaged, of files that are not as the run wrote them."""
         paths = {name: find_file(self.path / name) for name in digests}
         losses = {name: "gone" for name, path in paths.items() if not path.is_file()}
         present = {name: digest_of_file(path) for name, path in paths.items() if name not in losses}
@@ -115,12 +132,11 @@ class RunFolder:
             writer.writerows(row_to_cells(row) for row in rows)
 
     def read_rows(self) -> list[Row]:
-        """All rows. Raises ResultsError naming file and line when the file is absent or broken."""
+        """All rows. Raises ResultsError with file and line: absent or broken."""
         try:
             path = demand_file(find_file(self.rows_path))
-            with (gzip.open if path.suffix == ".gz" else open)(
-                path, "rt", newline="", encoding="utf-8"
-            ) as stream:
+            read = gzip.open if path.suffix == ".gz" else open
+            with read(path, "rt", newline="", encoding="utf-8") as stream:
                 reader = csv.reader(stream)
                 if next(reader, ()) != list(COLUMNS):
                     raise ResultsError(f"the columns should be {','.join(COLUMNS)}")
@@ -128,7 +144,7 @@ class RunFolder:
                 return [cells_to_row(dict(zip(COLUMNS, cells, strict=True))) for cells in lines]
         except FileNotFoundError:
             raise ResultsError(f"{self.rows_path}: no such file; is this the folder of a run?") from None
-        except (ValueError, csv.Error, EOFError, gzip.BadGzipFile) as error:
+        except (ValueError, csv.Error, EOFError, gzip.BadGzipFile, zlib.error) as error:
             # Not UTF-8, a cell of 131 kB, another number of cells, a damaged copy.
             raise ResultsError(f"{self.rows_path}: line {reader.line_num}: {error}") from None
 
@@ -140,7 +156,7 @@ ENERGY = "energy/"
 
 
 def write_frame_energies(folder: RunFolder, rows: Iterable[Row]) -> None:
-    """Write frame_energies.csv, whole or not at all: the energy of each evaluated frame by term.
+    """Write frame_energies.csv whole or not at all: energies of each evaluated frame by term.
 
     A line is a frame: scene, method, seed, seconds of the motion, then joules of each term and of their
     sum. A term that a scene does not have is left empty. It has whole motions in garments by reference,
@@ -170,7 +186,7 @@ def write_frame_energies(folder: RunFolder, rows: Iterable[Row]) -> None:
 
 
 def _curves(path: Path) -> dict[str, np.ndarray]:
-    """Read seconds, and energies by term, of a cell; empty where somebody removed its file."""
+    """Read seconds, and energies by term, of a cell; empty without its file."""
     from reference_sim.files.array_file import read_arrays
 
     if not path.is_file():
@@ -181,7 +197,7 @@ def _curves(path: Path) -> dict[str, np.ndarray]:
 
 
 def read_frame_energies(path: Path) -> pd.DataFrame:
-    """Return the lines of frame_energies.csv, nan where a cell is empty; none without the file.
+    """Return the lines of frame_energies.csv, nan for empty cells; none without it.
 
     Raises:
         ResultsError: a file of other columns, or with a cell that is no number.
@@ -196,6 +212,6 @@ def read_frame_energies(path: Path) -> pd.DataFrame:
         if tuple(columns[: len(CELL)]) != CELL or len(columns) == len(CELL):
             raise ValueError(f"the columns should be {','.join(CELL)} and energies")
         return table.replace("", "nan").astype({"seed": int, **dict.fromkeys(columns[3:], float)})
-    except (OSError, ValueError, EOFError) as error:
+    except (OSError, ValueError, EOFError, zlib.error) as error:
         reason = " ".join(str(error).split())
         raise ResultsError(f"{path}: not readable as CSV in UTF-8 ({reason})") from None

@@ -1,8 +1,7 @@
 """Finished results of a run's folder: which are reused, which stale.
 
-An entry names the inputs, code, packages and files that its outcome came of; where one of them is another
-now, the task is done again. It is written whole after its files, and holds their digests: a file that is
-not as it was written is missing.
+An entry names the inputs, code, packages and files that its outcome came of: with another one the task is
+done again. It is written whole after its files, with their digests: a file that differs is missing.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from reference_sim.files.atomic_files import replacing
 
 
 class Cache:
-    """Entries of one run's folder. retry: whether failed tasks are done again; origin: see Outcome."""
+    """Entries of a run's folder. retry: whether failed tasks are done again; origin: see Outcome."""
 
     def __init__(
         self, folder: RunFolder, *, retry: bool = False, origin: dict[str, Any] | None = None
@@ -32,7 +31,7 @@ class Cache:
         self.folder, self.retry, self.origin = folder, retry, origin or {}
 
     def find(self, task: Task, others: Mapping[TaskId, Outcome]) -> tuple[str, Outcome | None]:
-        """Return why a task has to be run, or how it failed; and its outcome, None where it has to be run.
+        """Return why a task has to be run, or how it failed; and its outcome, None if to be run.
 
         others: outcomes of the tasks that it reads.
         """
@@ -88,7 +87,7 @@ _KEPT = ("status", "reason", "failed", "result", "seconds")
 
 
 def dependencies(task: Task, others: Mapping[TaskId, Outcome]) -> dict[str, str]:
-    """Return name -> digest or version of each input, folder of code, package and task that a task reads."""
+    """Return name -> digest or version of each input, code, package and task that a task reads."""
     inputs = {name: digest(value) for name, value in task.inputs.items()}
     contents = {" ".join(id): others.get(id, Outcome()).content for id in (*task.needs, *task.reads)}
     return inputs | software(*task.code) | contents

@@ -1,6 +1,6 @@
 """One cell, in a process of its own: prepare off the clock, run on it, write the raw trajectory.
 
-Metrics come later, from the files. The process loads what its scene and method need and nothing else.
+Metrics come later, from the files. The process loads what its scene and method need alone.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def prepare_method(cell: Cell, context: Context) -> Method:
 
 
 def clock(method: Method, min_time: float) -> tuple[Trajectory, Reading, list[np.ndarray]]:
-    """Return the trajectory, the time of each run, and the times (T,) [s] it states for its frames."""
+    """Return trajectory, time of each run, and the times (T,) [s] it states for its frames."""
     frames = []
 
     def run() -> Trajectory:
@@ -47,7 +47,7 @@ def clock(method: Method, min_time: float) -> tuple[Trajectory, Reading, list[np
         return trajectory
 
     trajectory, reading = time_run(run, read=lambda trajectory: trajectory.positions, min_time=min_time)
-    # A first run that compiled is not among them.
+    # A first run that compiled is none of them.
     return trajectory, reading, frames[-len(reading.runs) :]
 
 
@@ -65,24 +65,24 @@ def times(cell: Cell, reading: Reading, frames: list[np.ndarray]) -> dict[str, f
 
 
 def run_cell(cell: Cell, min_time: float, context: Context, outcomes: Needed) -> Outcome:
-    """Return the outcome of a cell: its trajectory, timed for `min_time` [s], and the time of its inputs."""
+    """Return the outcome of a cell: its trajectory, timed for `min_time` [s], and inputs."""
     try:
         return compute_cell(cell, min_time, context)
     except Exception as error:
-        # Nobody is to look at the frames of a cell that failed.
+        # Nobody is to look at frames of a failed cell.
         for name in files_of(cell, context.folder):
             (context.folder.path / name).unlink(missing_ok=True)
         return replace(failure(error), result={"peak": peak_memory()})
 
 
 def files_of(cell: Cell, folder: RunFolder) -> tuple[str, ...]:
-    """Return the names of the files that a cell and its measurement leave in the run's folder."""
+    """Return the names of the files of a cell and its measurement in the run's folder."""
     paths = (folder.trajectory_path, folder.curves_path, folder.quasi_static_path)
     return tuple(folder.relative(path(*cell.key)) for path in paths)
 
 
 def compute_cell(cell: Cell, min_time: float, context: Context) -> Outcome:
-    """Prepare off the clock, run on it, write the trajectory; memory is that until the run has ended."""
+    """Prepare off the clock, run on it, write the trajectory; memory is until the run ends."""
     import numpy as np
 
     folder = context.folder
@@ -91,7 +91,7 @@ def compute_cell(cell: Cell, min_time: float, context: Context) -> Outcome:
         trajectory, reading, frames = clock(method, 0.0)
     else:
         trajectory, reading = method.run(), Reading((math.nan,))
-    peak = peak_memory()  # what follows, as many bodies at once, is not what others are compared by
+    peak = peak_memory()  # what follows, as many bodies at once, is not compared
     result: dict[str, float | str] = {
         "seconds": reading.seconds,
         "frames": max(trajectory.frames - (not cell.entry.gives_first_frame), 1),
@@ -129,9 +129,7 @@ def compute_cell(cell: Cell, min_time: float, context: Context) -> Outcome:
 def time_batch(cell: Cell, min_time: float, context: Context, outcomes: Needed) -> Outcome:
     """Return the time of many bodies at once, by the method that this process has run."""
     method = context.memo.get("method") or prepare_method(cell, context)
-    positions, reading = time_run(
-        method.batch(BATCH), read=lambda positions: positions, min_time=min_time
-    )
+    positions, reading = time_run(method.batch(BATCH), read=lambda x: x, min_time=min_time)
     seconds = reading.seconds / (positions.shape[0] * positions.shape[1])
     result = {"seconds": seconds, "complaint": reading.complaint}
     if reading.complaint:
@@ -140,7 +138,7 @@ def time_batch(cell: Cell, min_time: float, context: Context, outcomes: Needed) 
 
 
 def repeat_cell(limit: float, cell: Cell, min_time: float, context: Context, outcomes: Needed) -> Outcome:
-    """Return the time of one more run of a cell, whose first did not take longer than `limit` [s]."""
+    """Return the time of one more run of a cell whose first took at most `limit` [s]."""
     if outcomes[cell.id()].result["seconds"] > limit:
         return Outcome("skipped", "the first run took too long")
     _, reading, frames = clock(prepare_method(cell, context), min_time)
@@ -150,7 +148,7 @@ def repeat_cell(limit: float, cell: Cell, min_time: float, context: Context, out
 
 
 def build_scene(scene: Scene, context: Context) -> BuiltScene:
-    """Return the scene, built once for a batch; a dressed one with the start of the run's folder."""
+    """Return the scene, built once a batch; a dressed one with the start in the folder."""
     run, assets = context.folder, context.assets
     if "scene" in context.memo:
         return context.memo["scene"]
@@ -179,14 +177,14 @@ def time_inputs(method: Method, scene: BuiltScene, *, min_time: float) -> Readin
         return np.zeros(1)
 
     make(0)  # whatever is loaded or compiled at first
-    _, reading = time_run(all_frames, read=lambda images: images, min_time=min_time)
+    _, reading = time_run(all_frames, read=lambda x: x, min_time=min_time)
     return replace(reading, runs=tuple(seconds / frames for seconds in reading.runs))
 
 
 def judge(
     trajectory: Trajectory, reading: Reading, scene: BuiltScene, entry: MethodEntry
 ) -> tuple[str, str]:
-    """Return status and reason of a row, by what the trajectory says and holds, and the clock."""
+    """Return status and reason of a row, by trajectory and clock."""
     import numpy as np
 
     reason = " ".join(trajectory.reason.split())
@@ -212,14 +210,15 @@ def judge(
 
 
 def misshapen(positions: np.ndarray, scene: BuiltScene, *, other_mesh: bool = False) -> str:
-    """Why these are no positions (T,V,3) of the scene, or empty. There may be fewer frames, and no more.
+    """Why these are no positions (T,V,3) of the scene, or empty. Fewer frames may be there.
 
     other_mesh: whether there may be another number of vertices.
     """
     import numpy as np
 
     x = np.asarray(positions)
-    shape = (scene.frames, x.shape[1] if other_mesh else scene.cloth.vertex_count, 3)
+    count = x.shape[1] if other_mesh and x.ndim == 3 else scene.cloth.vertex_count
+    shape = (scene.frames, count, 3)
     if x.dtype.kind == "f" and x.shape[1:] == shape[1:] and len(x) <= shape[0]:
         return ""
     return f"gives positions {x.dtype} {x.shape}: floats {shape} are due, the start included"

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
     from distributed import Client
 
 FIRST = 5.0  # [s] in which a scheduler answers at first
-PATIENCE = 60.0  # [s] for a scheduler that was lost to be there again
+PATIENCE = 60.0  # [s] for a lost scheduler to be there again
 WATCH = 0.5  # [s] between a worker's looks at whether its task is still wanted
 
 
@@ -42,7 +42,7 @@ def check_scheduler(address: str) -> None:
 
 
 def _connect(address: str, seconds: float) -> Client:
-    """Return a client of the scheduler, which waits so long for one that was lost. Raises RunRefused."""
+    """Return a client, which waits so long for a lost scheduler. Raises RunRefused."""
     try:
         from distributed import Client
     except ImportError:
@@ -50,7 +50,7 @@ def _connect(address: str, seconds: float) -> Client:
     logging.getLogger("distributed").setLevel(logging.CRITICAL)  # what matters is said in one line
     try:
         return Client(address, timeout=seconds, name="benchmarks.run", set_as_default=False)
-    except Exception as error:  # whatever the bytes of another server lead to, a MemoryError too
+    except Exception as error:  # whatever bytes of another server lead to, also MemoryError
         raise RunRefused(
             f"--scheduler {address}: no scheduler of dask answers there ({one_line(error)}); start one by "
             "`dask scheduler` and give the address that it prints, as tcp://HOST:8786"
@@ -58,7 +58,7 @@ def _connect(address: str, seconds: float) -> Client:
 
 
 class Cluster:
-    """The back end of a cluster: each thread of its workers does a task at a time. Workers come and go.
+    """Back end of a cluster: each thread of its workers does a task at a time. Workers come and go.
 
     Raises RunRefused where no scheduler answers.
     """
@@ -91,7 +91,7 @@ class Cluster:
             yield outcome
 
     def _outcome(self, task: Task, outcomes: Needed, address: str) -> tuple[Outcome, str]:
-        """Return the outcome of a task and the address of its worker. address: of the preferred one."""
+        """Return a task's outcome and its worker's address. address: of the preferred one."""
         work = pickle.dumps((task, outcomes, software_of(task)))
         while True:
             try:
@@ -119,7 +119,7 @@ class Cluster:
         self.client.close()
 
     def rest(self) -> None:
-        """End the processes of the run's folder on all workers, those of a killed command too."""
+        """End the processes of the run's folder on all workers, also of a killed command."""
         if self.client.status == "running":
             with suppress(OSError):  # no scheduler: its workers end by themselves
                 self.client.run(end_processes, self.folder, on_error="ignore")
@@ -131,7 +131,7 @@ class Cluster:
 
 
 def software_of(task: Task) -> dict[str, str]:
-    """Return name -> digest or version of all that computes an outcome, files of a user's method included."""
+    """Return name -> digest or version of all that computes an outcome, also files of a user."""
     method = task.inputs.get("method")
     files = method["files"] if isinstance(method, dict) else ()
     digests = {name: digest_of_file(Path(name)) for name in files if Path(name).is_file()}
@@ -176,7 +176,7 @@ def do_task(assets: Path, work: bytes) -> tuple[Outcome, str]:
 
 def _process_of(assets: Path) -> TaskProcess:
     """Return the process of this thread for tasks of the run that has these assets."""
-    # A nanny makes its worker a daemon, which may have no processes. Ours end with it by themselves.
+    # A nanny's worker is a daemon, which may have no processes. Ours end with it by themselves.
     multiprocessing.current_process()._config["daemon"] = False  # type: ignore[attr-defined]
     one_thread()
     thread = threading.get_ident()

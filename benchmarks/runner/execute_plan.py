@@ -69,9 +69,8 @@ def execute(plan: Plan, assets: Assets | None = None) -> int:
     if failures := len(lines):
         lines[MOST_FAILURES:] = ["more in results.csv and run.json"] * (failures > MOST_FAILURES)
     methods = {row.method for row in log.rows if row.status != "skipped"}
-    lines += {
-        r.method: f"{r.method}: skipped: {r.reason}" for r in log.rows if r.method not in methods
-    }.values()
+    reasons = {row.method: row.reason for row in log.rows if row.method not in methods}
+    lines += [f"{method}: skipped: {reason}" for method, reason in reasons.items()]
     if runner.reused:
         lines.append(f"{len(runner.reused)} results taken from earlier runs in this folder")
     print(*lines, sep="\n", end="\n" if lines else "", file=sys.stderr)
@@ -81,7 +80,7 @@ def execute(plan: Plan, assets: Assets | None = None) -> int:
 
 
 def ends_with(folder: RunFolder, rows: Sequence[Row]) -> Iterator[str]:
-    """Yield the paths of a run's page, PDF and rows, and commands that may come next."""
+    """Yield paths of a run's page, PDF and rows, and commands that may come next."""
     for path in (folder.page_path, folder.report_path, folder.rows_path):
         yield f"{path.suffix[1:]:4}  {path.resolve()}"
     costs = [row for row in rows if row.status in USABLE and row.metric == "cost/frame"]
@@ -94,7 +93,7 @@ def ends_with(folder: RunFolder, rows: Sequence[Row]) -> Iterator[str]:
 
 
 class NotSettled(Exception):
-    """A method asks for a start that is not simulated yet: so far it could be prepared."""
+    """A method asks for a start that is not simulated yet."""
 
 
 def _refuse_start() -> NoReturn:
@@ -102,7 +101,7 @@ def _refuse_start() -> NoReturn:
 
 
 def check_methods(plan: Plan) -> Assets | None:
-    """Prepare stored roll-outs and a user's methods before anything is written; return the assets for it.
+    """Prepare stored roll-outs and a user's methods before anything is written; return assets.
 
     Each roll-out has to fit its scene, and a method to be prepared for its first, up to where it asks for
     the start. Methods are not asked whose network is still to be trained.
@@ -114,29 +113,27 @@ def check_methods(plan: Plan) -> Assets | None:
     checked = [cell for cell in cells if cell.entry.module == STORED]
     checked += {cell.method: cell for cell in users}.values()
     assets = None
-    try:
+    with suppress(ValueError):  # the run says itself what cannot be made
         assets = plan.open_assets() if plan.garments and checked else None
-        for cell in checked:
+    for cell in checked:
+        try:
             scene = replace(cell.scene.build(assets), settle=_refuse_start)
-            try:
-                with suppress(NotSettled):
-                    cell.entry.make(models=plan.folder, seed=cell.seed).prepare(scene)
-            except RollOutFileError:
-                raise
-            except Exception as error:  # whatever a user's code raises
-                raise RunRefused(f"{cell.label}: cannot be prepared: {one_line(error)}") from None
-    except (RollOutFileError, RunRefused):
-        raise
-    except ValueError:
-        pass  # the run says itself what cannot be made or built
+        except Exception:  # whatever a user's code raises: the cell itself says it
+            continue
+        try:
+            with suppress(NotSettled):
+                cell.entry.make(models=plan.folder, seed=cell.seed).prepare(scene)
+        except RollOutFileError:
+            raise
+        except Exception as error:
+            raise RunRefused(f"{cell.label}: cannot be prepared: {one_line(error)}") from None
     return assets
 
 
 def is_accepted(row: Row) -> bool:
-    """Return whether a row lets the run end with status 0; an extreme case may fail with a reason."""
-    return row.status in ("ok", "skipped") or (
-        row.suite == "extremes" and row.status != "failed" and bool(row.reason)
-    )
+    """Return whether a row lets the run end well; an extreme case may fail with a reason."""
+    may_end = row.suite == "extremes" and row.status != "failed" and bool(row.reason)
+    return row.status in ("ok", "skipped") or may_end
 
 
 def make_report(log: RunLog) -> str | None:
@@ -160,7 +157,7 @@ def make_report(log: RunLog) -> str | None:
 
 @contextmanager
 def held(folder: Path) -> Iterator[None]:
-    """Hold a folder, made where it is not there. Raises RunRefused where another run, or a file, has it.
+    """Hold a folder, made if absent. Raises RunRefused where another run, or a file, has it.
 
     The lock lies on the folder itself and leaves no file; it ends with the process. Where the file system
     has no such locks nothing is held, and that is said.
@@ -168,9 +165,7 @@ def held(folder: Path) -> Iterator[None]:
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:  # as where a file is in the way
-        raise RunRefused(
-            f"--out {folder}: cannot be made ({error.strerror}); name another folder"
-        ) from None
+        raise RunRefused(f"--out {folder}: cannot be made ({error.strerror}); name another") from None
     with ExitStack() as closing:
         try:
             hold = os.open(folder, os.O_RDONLY)
@@ -186,7 +181,7 @@ def held(folder: Path) -> Iterator[None]:
 
 
 def describe(plan: Plan) -> str:
-    """Return the plan in a few lines, and one line for each task. Starts nothing, writes nothing."""
+    """Return the plan in a few lines, and a line for each task. Writes nothing."""
     folder = RunFolder(plan.folder / "none" if plan.fresh else plan.folder)
     study, skipped, stage = plan.study, sum(not runs(cell) for cell in plan.cells), ""
     todo: list[Task] = []

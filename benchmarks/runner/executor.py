@@ -26,8 +26,7 @@ Done = tuple[Task, Outcome]
 class LocalProcesses:
     """Single-threaded processes of this machine, of which `slots` are at work side by side.
 
-    They stay for the next batch, which then loads and compiles nothing again. A cluster has the same
-    methods.
+    They stay for the next batch, which loads and compiles nothing again. A cluster has the same methods.
     """
 
     def __init__(self, folder: RunFolder, assets: Assets | None, slots: int) -> None:
@@ -74,9 +73,9 @@ class Executor:
         self._named: dict[str, TaskProcess] = {}
 
     def together(self, ready: Callable[[], Batch | None]) -> Iterator[Done]:
-        """Do batches of untimed tasks, some side by side, until none is at work and none is ready.
+        """Do batches of untimed tasks, some side by side, until none is at work or ready.
 
-        ready: the next batch that can begin, None where there is none before further outcomes are known.
+        ready: the next batch that can begin, None before further outcomes are known.
         """
         finished: queue.SimpleQueue[Done] = queue.SimpleQueue()
         stopped = threading.Event()
@@ -115,7 +114,7 @@ class Executor:
                 self.back_end.rest()
 
     def run_alone(self, task: Task, outcomes: Needed) -> Outcome:
-        """Return the outcome of a timed task, done in the process that it names, with nothing beside it."""
+        """Return the outcome of a timed task, done alone in the process that it names."""
         if task.process not in self._named:
             assets = self.assets.only(task.motion) if self.assets and task.motion else None
             self._named[task.process] = TaskProcess(self.folder, assets)

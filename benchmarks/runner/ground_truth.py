@@ -1,4 +1,4 @@
-"""Simulations beside the cells: settled garments, motions to learn from, and quasi-static solutions."""
+"""Simulations beside the cells: settled garments, training motions, quasi-static solutions."""
 
 from __future__ import annotations
 
@@ -53,11 +53,11 @@ def files_of_start(scene: Scene, run: RunFolder) -> tuple[str, ...]:
 
 
 def simulate_motion(scene: Scene, entry: MethodEntry, context: Context, outcomes: Needed) -> Outcome:
-    """Write the simulation of a training motion by a method, settling included; a whole one teaches."""
+    """Write the simulation of a training motion, settling included; a whole one teaches."""
     built, run = scene.build(context.assets), context.folder
     trajectory = simulate_scene(built, entry, run)
     path = run.trajectory_path(scene.name, entry.name)
-    # Without what the clock showed: the same simulation has the same bytes wherever it is done.
+    # Without its times: the same simulation has the same bytes wherever it is done.
     replace(trajectory, frame_seconds=trajectory.frame_seconds[:0]).save(path)
     result = {
         "motion": scene.motion,
@@ -77,7 +77,7 @@ def simulate_clips(
     context: Context,
     outcomes: Needed,
 ) -> Outcome:
-    """Write the vertices of those clips whose simulation, settled like a motion's, is whole and converged.
+    """Write the vertices of clips whose simulation, settled as a motion's, is whole and converged.
 
     The clips are mixed from `motions`: those that `part` + 1 augmented frames for each original one have,
     and `part` have not. The scene is that of any motion in the garment.
@@ -137,7 +137,7 @@ def simulate_scene(scene: BuiltScene, entry: MethodEntry, folder: RunFolder) -> 
 
 
 def simulate_quasi_static(scene: Scene, context: Context, outcomes: Needed) -> Outcome:
-    """Write the quasi-static solution of each frame of a scene: dynamics are measured against it."""
+    """Write the quasi-static solution of each frame: dynamics are measured against it."""
     import numpy as np
 
     from benchmarks.methods.simulation import STATIC

@@ -1,4 +1,4 @@
-"""Work that may hang or crash: done in a process of its own, which is ended at a deadline.
+"""Work that may hang or crash: in a process of its own, ended at the deadline of a task, if it has one.
 
 A solver's own timeout is looked at between its iterations; a loop that never ends, or compiled code that
 takes the interpreter down with it, has to be stopped from outside. The process leads a group of its own,
@@ -33,16 +33,16 @@ if TYPE_CHECKING:
 
 # Time for an idle process to clean up behind itself: semaphores, as of progress bars.
 PATIENCE = 2.0  # [s]
-# [s] for what a process does before its first task: it may have to compile every kernel
+# [s] for what a process does before its first task: it may compile every kernel
 COMPILING = 900.0
-# What every process loads. Nothing that a scene may do without: not torch, not what a body is asked with.
+# What every process loads: nothing that a scene may do without, as torch.
 LOADED_BY_ALL = ("h5py", "numba", "scipy.sparse.linalg", "reference_sim", "benchmarks.runner.cells")
-# What every task of a scene with a body loads: torch skins the garment.
+# What tasks of a scene with a body load: torch skins the garment.
 LOADED_BY_DRESSED = ("benchmarks.scenes.dressed_body", "snug.networks.dressed_body")
 
 
 def start_loading(*also: str) -> BaseContext:
-    """Return the context that processes come from: none of them has anything of this one.
+    """Return the context of processes that have nothing of this one.
 
     On Linux a server forks them. It loads LOADED_BY_ALL and these modules once, while this process does
     something else. Elsewhere libraries may not outlive a fork, and each process loads its own.
@@ -57,7 +57,7 @@ def start_loading(*also: str) -> BaseContext:
 
 
 class TaskProcess:
-    """A process that does one task after another, started when first needed and after one that was ended.
+    """A process that does task after task, started when needed and after one that was ended.
 
     Call `close` at the end.
     """
@@ -68,7 +68,7 @@ class TaskProcess:
         self._process: Any = None
 
     def do(self, task: Task, outcomes: Needed) -> Outcome:
-        """Return the task's outcome, however it ends; what it leaves in the memo is there for its batch.
+        """Return the task's outcome, however it ends; its memo stays for its batch.
 
         Raises RunStopped.
         """
@@ -116,13 +116,13 @@ class TaskProcess:
         self._process = process
 
     def stop(self) -> None:
-        """Kill it and what it has started, from another thread: a task under way has failed."""
+        """Kill it and what it has started, from another thread: its task has failed."""
         if (process := self._process) is not None:
             end_group(process.pid)
             process.kill()
 
     def close(self) -> None:
-        """Let it end by itself, for it has nothing to do; then end all that it has started."""
+        """Let it end by itself, idle as it is; then end all that it has started."""
         if self._process is not None:
             self._pipe.close()
             self._process.join(PATIENCE)
@@ -139,7 +139,7 @@ class TaskProcess:
 def explain_exit(code: int) -> tuple[str, str]:
     """Reason and status of a process that ended by itself with this exit code.
 
-    Nobody here kills a process that answers in time: a SIGKILL comes from a system that is out of memory.
+    Nobody here kills a process that answers in time: a SIGKILL is of a system without memory.
     """
     if code == -signal.SIGKILL:
         return "the process was killed by SIGKILL: the system was out of memory", "out-of-memory"

@@ -1,7 +1,6 @@
-"""The loop over tasks: reuse a cached outcome, or run the task in its process and keep its outcome.
+"""The loop over tasks: reuse a cached outcome, or run the task and keep its outcome.
 
-Dry run, resume, failures, what an interrupt leaves and exclusive timing are decided here and nowhere
-else.
+Dry run, resume, failures, what an interrupt leaves and exclusive timing are decided here alone.
 """
 
 from __future__ import annotations
@@ -37,7 +36,7 @@ class Runner:
         self.outcomes |= dict.fromkeys(ids, refused)
 
     def run(self, executor: Executor) -> None:
-        """Do all tasks: untimed ones side by side until others wait for timed ones, one by one."""
+        """Do all tasks: untimed ones side by side until others wait for the timed, one by one."""
         unknown = [task for task in self.tasks if task.id not in self.outcomes]
         try:
             with Progress(unknown, executor.back_end.slots) as self.progress:
@@ -67,7 +66,7 @@ class Runner:
         return all(id in self.outcomes or id not in self.titles for id in ids)
 
     def _run_alone(self, tasks: Sequence[Task], executor: Executor) -> None:
-        """Do timed tasks one by one; a process ends as soon as no other task will want it."""
+        """Do timed tasks one by one; a process ends when no other task wants it."""
         for place, task in enumerate(tasks):
             if self.decide(task):
                 self._keep(task, executor.run_alone(task, self._find_needs(task)))
@@ -78,7 +77,7 @@ class Runner:
     def decide(self, task: Task) -> bool:
         """Return whether the task is to be run now; where not, its outcome is known.
 
-        Files of an earlier run of it are removed then, so that nobody takes them for this one's.
+        Files of an earlier run of it are removed then.
         """
         _, outcome = self._find(task)
         if outcome is None:
@@ -93,7 +92,7 @@ class Runner:
         return False
 
     def _find(self, task: Task) -> tuple[str, Outcome | None]:
-        """Return why a task has to run, or how it failed; and its outcome where that is known."""
+        """Return why a task has to run, or how it failed; and its outcome, if known."""
         outcomes = self._find_needs(task)
         if task.skip:
             return task.skip, Outcome("skipped", task.skip)
@@ -126,7 +125,7 @@ class Runner:
         self.progress.end(task, outcome.seconds)
 
     def preview(self) -> Iterator[tuple[Task, str, Outcome | None]]:
-        """Yield each task and what `_find` says. One that would be run is taken to succeed."""
+        """Yield each task and what `_find` says, as if those to be run succeed."""
         for task in self.tasks:
             reason, outcome = self._find(task)
             self.outcomes[task.id] = outcome or Outcome(content="out of date")
@@ -148,10 +147,9 @@ def _able(tasks: Sequence[Task], *, timed: bool) -> list[Task]:
 
 
 def _batches(tasks: Sequence[Task]) -> list[list[Task]]:
-    """Return the tasks handed out together, by stage, the largest first: so workers end at about one time.
+    """Return the tasks handed out together, by stage, the largest first: workers end together.
 
-    The largest of all comes before its stage: all else fits in beside it, and two workers do not begin by
-    compiling the same kernels.
+    The largest of all comes first: the rest fits in beside it, and no two workers compile one kernel.
     """
     batches: dict[TaskId, list[Task]] = {}
     for task in tasks:

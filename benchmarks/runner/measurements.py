@@ -21,20 +21,22 @@ from benchmarks.runner.cells import build_scene
 from benchmarks.runner.task import Context, Needed, Outcome, one_line
 from reference_sim.files.atomic_files import replacing
 
+VERDICTS = tuple(status for status in STATUSES if status not in ("ok", "skipped"))  # of judge()
+
 
 def measure_cell(
     cell: Cell, cells: tuple[Cell, ...], gap_samples: int, outside: tuple[str, ...], context: Context,
     outcomes: Needed,
 ) -> Outcome:  # fmt: skip
-    """Measure the trajectory, and write energies of each frame and other curves beside it.
+    """Measure the trajectory, and write energies of frames and other curves beside it.
 
     Args:
         cell: what is measured.
-        cells: all of the scene, in the order of their roll-outs; those that are needed are compared with.
+        cells: all of the scene, in the order of their roll-outs.
         gap_samples: frames in which the energy gap is measured.
         outside: files of metrics not the project's, measured in every scene.
-        context: the roll-outs of a batch share search trees, and the energies of references.
-        outcomes: of the cells, of the quasi-static solution, and of the method in another scene.
+        context: roll-outs of a batch share search trees, and energies of references.
+        outcomes: of cells, the quasi-static solution, and the method in another scene.
     """
     if "roll-outs" not in context.memo:
         context.memo["roll-outs"] = roll_outs_of(cells, gap_samples, context, outcomes)
@@ -50,10 +52,8 @@ def measure_cell(
         curves[SECONDS][: roll_out.scene.warm_up] = np.nan
     frames = roll_out.trajectory.frames
     padded: dict[str, Any] = {  # nan after the last frame that was measured
-        name: np.pad(
-            curve, [(0, frames - len(curve))] + [(0, 0)] * (curve.ndim - 1), constant_values=np.nan
-        )
-        for name, curve in curves.items()
+        name: np.pad(x, [(0, frames - len(x))] + [(0, 0)] * (x.ndim - 1), constant_values=np.nan)
+        for name, x in curves.items()
     }
     with replacing(path) as temporary:
         np.savez_compressed(temporary, **padded)
@@ -87,10 +87,9 @@ def roll_outs_of(
 def measure_roll_out(
     roll_out: RollOut, chosen: Sequence[str] | None = None, outside: tuple[str, ...] = ()
 ) -> tuple[dict[str, float | Estimate], dict[str, np.ndarray], tuple[str, str]]:
-    """Return metrics and curves of a roll-out, and status and reason where a metric says that it has failed.
+    """Return metrics, curves, and status and reason of the first metric that says it failed.
 
-    All are empty where no frame is left after the warm-up. chosen: names of measurements, None for all
-    that apply; outside: files of users.
+    Without a frame after the warm-up all are empty. chosen: measurements, None for all; outside: files.
     """
     metrics: dict[str, float | Estimate] = {}
     curves: dict[str, np.ndarray] = {}
@@ -108,11 +107,17 @@ def measure_roll_out(
             values = dict(entry.measure(roll_out)) if entry.measure else {}
             if entry.compare:
                 values |= compare_family(roll_out, entry.compare)
+            names = {metric.name for metric in entry.metrics}
+            if alien := [n for n in values if not {n, f"{n.rpartition('/')[0]}/*"} & names]:
+                raise KeyError(f"{alien[0]} is not among its METRICS: declare it there")
             metrics |= {find_metric(name, outside).name: number(name, v) for name, v in values.items()}
             curves |= entry.series(roll_out) if entry.series else {}
-            ended = (entry.judge(roll_out, values) if entry.judge else None) or ended
-            if ended[0] not in STATUSES:
-                raise ValueError(f"judge() gives {ended!r}: expected None, or a status and a reason")
+            verdict = entry.judge(roll_out, values) if entry.judge else None
+            if verdict and not (verdict[0] in VERDICTS and any(verdict[1:])):
+                raise ValueError(f"judge() gives {verdict!r}: expected None, or a status and a reason")
+            ended = verdict if verdict and not ended[1] else ended
+        except MemoryError:
+            raise
         except Exception as error:
             raise RuntimeError(f"{entry.name}: {one_line(error)}") from error
     return metrics, curves, ended
@@ -130,7 +135,7 @@ def number(metric: str, value: Any) -> float | Estimate:
 def compare_family(
     roll_out: RollOut, compare: Callable[[RollOut, RollOut], dict[str, float]]
 ) -> dict[str, float | Estimate]:
-    """Return the numbers against the reference, with their change against each member of its family."""
+    """Return the numbers against the reference, and their change against its family."""
     if roll_out.reference is None:
         return {}
     values = compare(roll_out, roll_out.reference)

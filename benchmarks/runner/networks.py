@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from snug.networks.trained_model import TrainedModel
 
 EVERY = 20  # training steps between two rows of a model's history
-# Of a training's summary: what its guard against divergence has done, and its epochs.
+# Of a training's summary: what its guard against divergence did, and its epochs.
 INCIDENTS = ("high_windows", "skipped_updates", "restored", "epochs")
 CHECKPOINT_MINUTES = 1.0  # between two checkpoints: what a kill loses at most
 
@@ -69,7 +69,7 @@ class NetworkTraining:
         return model_path(folder.models_of(self.network.garment), self.network.name, self.network.seed)
 
     def files(self, folder: RunFolder) -> tuple[str, ...]:
-        """Return the name of the model's file in the folder; none of the package's, which stays there."""
+        """Return the name of the model's file in the folder; none of the package's."""
         return () if self.training.packaged else (folder.relative(self.path(folder)),)
 
 
@@ -114,7 +114,7 @@ def train(job: NetworkTraining, context: Context, outcomes: Needed) -> Outcome:
 
 
 def _outcome(model: TrainedModel, job: NetworkTraining, run: RunFolder, facts: dict[str, Any]) -> Outcome:
-    """Write the model; the outcome says how it was trained, and names the machine that trained it."""
+    """Write the model; the outcome says how, and on what machine, it was trained."""
     files = job.files(run)
     for name in files:
         model.save(run.path / name)
@@ -135,7 +135,7 @@ def _outcome(model: TrainedModel, job: NetworkTraining, run: RunFolder, facts: d
 
 
 def origin_of(job: NetworkTraining, outcomes: Needed, *, left_out: list[str]) -> dict[str, Any]:
-    """Return what the file of the model says of its training; left_out: motions without simulation."""
+    """Return what the model's file says of its training; left_out: motions not simulated."""
     simulated = job.training.simulated
     return {
         "network": job.network.name,
@@ -156,7 +156,7 @@ def origin_of(job: NetworkTraining, outcomes: Needed, *, left_out: list[str]) ->
 def mix_clips(
     job: NetworkTraining, assets: Assets, folder: RunFolder, outcomes: Needed
 ) -> tuple[list[Motion], dict[str, np.ndarray]]:
-    """Return the simulated augmented clips, and their vertices (T,V,3) [m] by name."""
+    """Return the simulated clips, and their vertices (T,V,3) [m] by name."""
     from reference_sim.files.array_file import read_arrays
     from snug.training.augmentation import make_shared_clips
 
@@ -177,10 +177,9 @@ MAKE = "benchmarks.run -o DIR trains it, --trained DIR takes it"
 
 
 def find_pretrained(job: NetworkTraining, folder: Path) -> tuple[Path | None, str]:
-    """Return the file of a network in a folder of such files, or of the run that trained it.
+    """Return the file of a network in a folder of such, or of the run that trained it.
 
-    Where there is none, or one of another training (of a packaged one: of another body or garment), why it
-    cannot be taken.
+    Where there is none, or one of another training (if packaged: body or garment), why it is not taken.
     """
     packaged = job.training.packaged
     name = network_name(packaged or job.network.name, job.network.garment, job.network.seed)
@@ -198,7 +197,7 @@ def find_pretrained(job: NetworkTraining, folder: Path) -> tuple[Path | None, st
 
 
 def take(job: NetworkTraining, source: Path, context: Context, outcomes: Needed) -> Outcome:
-    """Copy a network, once it is known to be whole; one of the package is read from there."""
+    """Copy a network that is whole; one of the package is read from there."""
     from snug.networks.trained_model import TrainedModel
 
     model = TrainedModel.load(source)

@@ -1,4 +1,4 @@
-"""Progress of a run: a line as each stage begins, and the time left, which never grows."""
+"""Progress of a run: a line as a stage begins, and the time left, which never grows."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from benchmarks.plan.cell import TaskId
 from benchmarks.runner.task import Task
 from reference_sim.command_line import SECONDS_OF_A_LOG, must_compile
 
-# [s] on an idle core: of a step of SNUG's training, else of a task of some 60 frames at 1000 vertices.
+# [s] on an idle core: of a step of SNUG's training, else of a task of 60 frames at 1000 vertices.
 EXPECTED = {
     "start": 2.5, "data": 6.0, "clips": 150.0, "network": 0.04, "cell": 2.5, "repeat": 0.5, "batch": 1.0,
     "quasi-static": 7.0, "metrics": 2.5, "case": 0.3,
@@ -22,7 +22,7 @@ COMPILING, REPORT = 20.0, 20.0  # [s]
 
 
 def expected_of(task: Task) -> float:
-    """Return how long a task may take [s], as long as nothing of its kind has been done."""
+    """Return how long a task may take [s] before any of its kind is done."""
     return EXPECTED.get(task.kind, 1.0) * task.work
 
 

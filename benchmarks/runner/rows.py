@@ -37,7 +37,7 @@ def rows_of(plan: Plan, tasks: Sequence[Task], outcomes: Outcomes) -> list[Row]:
 def rows_of_cell(
     cell: Cell, plan: Plan, tasks: Mapping[TaskId, Task], outcomes: Outcomes
 ) -> Iterator[Row]:
-    """Yield the rows of a cell in each of its suites; one without metrics is a row with its reason."""
+    """Yield the rows of a cell in each suite; without metrics a row with its reason."""
     outcome = outcomes.get(cell.id())
     if outcome is None:
         return
@@ -51,7 +51,7 @@ def rows_of_cell(
     if outcome.files:
         assert measured is not None
         if measured.failed:
-            status, reason = "failed", f"metrics: {measured.reason}"
+            status, reason = measured.status, f"metrics: {measured.reason}"
         else:
             if status == "ok":
                 status, reason = measured.status, measured.reason or reason
@@ -71,7 +71,7 @@ def rows_of_cell(
     if batch.result.get("complaint"):  # it worked on behind the clock in its run too
         status, reason, metrics = "failed", f"many at once: {batch.ending}", {}
     scene, entry = cell.scene, cell.entry
-    # Of a cell without numbers: nobody has asked for a time where none is taken.
+    # Of a cell without numbers: nobody asked for a time where none is taken.
     untimed = "energy" in (scene.metrics or ()) and not scene.timed
     base = Row(
         suite="", scene=scene.name, method=cell.method, seed=cell.seed,
@@ -93,7 +93,7 @@ def rows_of_cell(
 def _row(
     base: Row, status: str, entry: MethodEntry, name: str, measured: Any, outside: tuple[str, ...]
 ) -> Row:
-    """Return the row of a metric of a cell; measured: a number, or the parts of an Estimate."""
+    """Return the row of a metric; measured: a number, or the parts of an Estimate."""
     value, uncertainty, moved = measured if isinstance(measured, (tuple, list)) else (measured, None, ())
     metric, reason = find_metric(name, outside), base.reason
     if name == "cost/frame" and not entry.timed:
@@ -116,11 +116,11 @@ def _finite(number: float | None) -> float | None:
 
 
 def clock_costs(cell: Cell, repeats: int, outcomes: Outcomes) -> tuple[dict[str, float], str]:
-    """Return the costs that clock and process give, and a remark on what did not go well.
+    """Return costs by clock and process, and a remark on what went wrong.
 
     They are cost/frame and its percentiles, cost/whole, cost/batch [ms], cost/spread [%], cost/peak [MB].
 
-    Times are medians of the repeats; those of inputs, and the peak, are of the first run.
+    Times are medians of repeats; of inputs, and the peak, those of the first run.
     """
     first = outcomes[cell.id()]
     remark = ""
@@ -150,7 +150,7 @@ def clock_costs(cell: Cell, repeats: int, outcomes: Outcomes) -> tuple[dict[str,
 
 
 def model_costs(network: Outcome, taught_by: Sequence[Outcome]) -> dict[str, float]:
-    """Return cost/data, cost/setup, cost/memory and cost/train* of a trained network."""
+    """Return cost/data, /setup, /memory and /train* of a trained network."""
     if not network.result:
         return {}
     names = {
@@ -162,7 +162,7 @@ def model_costs(network: Outcome, taught_by: Sequence[Outcome]) -> dict[str, flo
 
 
 def machines_of(network: Outcome, taught_by: Sequence[Outcome]) -> dict[str, str]:
-    """Return metric -> hardware that measured its seconds, of tasks other than the cell."""
+    """Return metric -> hardware that measured its seconds, of other tasks than the cell."""
     if NAME in network.result:
         taught_by = [network]
     metrics = {"cost/data": taught_by, "cost/setup": [network], "cost/train": [network]}
@@ -174,7 +174,7 @@ def machines_of(network: Outcome, taught_by: Sequence[Outcome]) -> dict[str, str
 
 
 def with_remarks(reason: str, network: Outcome) -> str:
-    """Return the reason of a cell, or what its network learned without; and whether this is of a file."""
+    """Return the reason of a cell, or what its network lacked; and whether this is of a file."""
     facts = network.result
     if not reason and facts.get("left_out"):
         reason = f"its network learned without {', '.join(facts['left_out'])}: no simulation is whole"
@@ -185,7 +185,7 @@ def with_remarks(reason: str, network: Outcome) -> str:
 def _rows_of_case(case: Case, outcomes: Outcomes) -> Iterator[Row]:
     """Yield the row of a case, also of one that died or hung.
 
-    A hang and a crash are failures of the solver: only one that ends by itself may call it a timeout.
+    A hang and a crash are failures: only a solver that ends by itself may call it a timeout.
     """
     outcome = outcomes.get(("case", case.name))
     if outcome is None:
@@ -202,15 +202,14 @@ def _rows_of_case(case: Case, outcomes: Outcomes) -> Iterator[Row]:
 
 
 def _origin(outcome: Outcome, protocol: str) -> dict[str, Any]:
-    """Return the origin of an outcome's rows; those of an earlier run keep its protocol, unless it is OWN."""
+    """Return the origin of an outcome's rows; an earlier run's protocol stays, unless it is OWN."""
     return {"protocol": protocol, **outcome.origin, **({"protocol": OWN} if protocol == OWN else {})}
 
 
 def with_uncertainty(rows: Sequence[Row], outside: tuple[str, ...] = ()) -> list[Row]:
-    """Return the rows, those of the reference with their noise, and what the family changes.
+    """Return the rows, the reference's with their noise, and what the family changes.
 
-    Of answers, and not of what has an uncertainty of its own. outside: where further metrics are
-    declared.
+    Of answers, and not of what has an uncertainty of its own. outside: files of further metrics.
     """
     others: dict[tuple[str, str], dict[str, float]] = {}
     for row in rows:

@@ -75,22 +75,20 @@ class RunLog:
         self.folder.write_config(self.config)
 
     def open_assets(self, opened: Assets | None = None) -> Assets:
-        """Body, garments and motions of the dressed scenes. Raises ValueError where one cannot be made."""
+        """Body, garments and motions. Raises ValueError where one cannot be made."""
         print("body, garments and motions", file=sys.stderr, flush=True)
         assets = opened or self.plan.open_assets()
         self.config["garments"] = {
             name: {"vertices": len(g.rest_positions), "material": dataclasses.asdict(g.material)}
             for name, g in assets.garments.items()
         }
-        self.config["motions"]["frames"] = {
-            name: motion.frames for name, motion in assets.motions.items()
-        }
-        self.config["motion_sources"] = {name: motion.source for name, motion in assets.motions.items()}
+        self.config["motions"]["frames"] = {name: m.frames for name, m in assets.motions.items()}
+        self.config["motion_sources"] = {name: m.source for name, m in assets.motions.items()}
         self.folder.write_config(self.config)
         return assets
 
     def note_outcomes(self, runner: Runner) -> None:
-        """Note the outcomes of ground truth, trainings and cells, and that the run has finished."""
+        """Note outcomes of ground truth, trainings and cells, and the end of the run."""
         of_kind: dict[str, dict[str, Any]] = {}
         for task in runner.tasks:
             outcome = runner.outcomes[task.id]
@@ -115,7 +113,7 @@ class RunLog:
         self.folder.write_config(self.config)
 
     def count_look(self) -> None:
-        """Add a look at the test motions where the rows hold numbers of them that no earlier look had."""
+        """Add a look at the test motions where the rows hold new numbers of them."""
         role_of = self.plan.motions.role_of
         tests = {scene.name for scene in self.plan.scenes if role_of(scene.motion) == "test"}
         rows = [row for row in self.rows if row.scene in tests]
@@ -131,7 +129,7 @@ def now() -> str:
 
 
 def describe_plan(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
-    """Return what run.json says of metrics, methods, scenes and cases that is not in their rows."""
+    """Return what run.json says of metrics, methods, scenes and cases beside rows."""
     methods = {cell.method: cell.entry for cell in plan.cells}
     order = {name: place for place, name in enumerate(list_metrics(plan.metrics))}
     names = dict.fromkeys(row.metric for row in rows if row.method in methods)
@@ -154,9 +152,7 @@ def describe_plan(plan: Plan, rows: Sequence[Row]) -> dict[str, Any]:
         for name, entry in methods.items()
     }
     cases = {
-        case.name: {
-            "description": case.description, "scene": case.scene or case.name, "metric": case.metric,
-        }
-        for case in plan.cases
-    }  # fmt: skip
+        c.name: {"description": c.description, "scene": c.scene or c.name, "metric": c.metric}
+        for c in plan.cases
+    }
     return {"metrics": metrics, "methods": of_methods, "scenes": scenes, "cases": cases}

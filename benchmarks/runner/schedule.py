@@ -18,11 +18,11 @@ from benchmarks.method import MethodEntry, Simulated
 from benchmarks.methods import find_method
 from benchmarks.methods.own_energies import find_own_reference
 from benchmarks.metric import COMPARED_WITH
-from benchmarks.plan.cell import Cell, TaskId, flat, id_of
+from benchmarks.plan.cell import Cell, TaskId, id_of
 from benchmarks.plan.plan import Network, Plan, network_of, runs
 from benchmarks.presets import find_preset
 from benchmarks.provenance import digest, digest_of_file, find_module, software
-from benchmarks.results.run_folder import RunFolder
+from benchmarks.results.run_folder import RunFolder, flat
 from benchmarks.runner.cells import files_of, repeat_cell, run_case, run_cell, time_batch
 from benchmarks.runner.ground_truth import (
     clips_of,
@@ -42,7 +42,7 @@ from snug.trained import FOLDER
 if TYPE_CHECKING:
     from benchmarks.validation.case import Case
 
-# Code that makes an outcome stale when it changes; of a run also its method's and scene's: code_behind.
+# Code whose changes make an outcome stale; of a run also its method's and scene's: code_behind.
 RUNNING = (
     "reference_sim", "snug", "benchmarks/assets.py", "benchmarks/scene.py", "benchmarks/scenes",
     "benchmarks/meshes.py", "benchmarks/external", "benchmarks/method.py",
@@ -60,7 +60,7 @@ USERS_OWN = (*MEASURING, "benchmarks/methods")  # what a user's file may import
 
 
 def read_entry(entry: MethodEntry | Scene | Case) -> dict[str, Any]:
-    """Return what a scene, a method or a case declares, without descriptions; of files their content."""
+    """Return what an entry declares, without descriptions; of files their content."""
     values = {name: value for name, value in vars(entry).items() if name not in ("description", "label")}
     if isinstance(entry, MethodEntry | Scene):
         values["files"] = {path: digest_of_file(Path(path)) for path in values["files"]}
@@ -68,7 +68,7 @@ def read_entry(entry: MethodEntry | Scene | Case) -> dict[str, Any]:
 
 
 def code_behind(entry: MethodEntry | Scene) -> tuple[str, ...]:
-    """Return the file of the module of a scene or a method, and what files of a user depend on.
+    """Return the file of a scene's or method's module, and what files of a user depend on.
 
     Raises DeclarationError where its module is missing.
     """
@@ -77,20 +77,20 @@ def code_behind(entry: MethodEntry | Scene) -> tuple[str, ...]:
 
 
 def users_code(*homes: str) -> tuple[str, ...]:
-    """Return those that are files of users, by absolute paths, and what of ours such a file may import."""
+    """Return those that are files of users, by absolute paths, and what of ours they may import."""
     files = tuple(home for home in homes if Path(home).is_absolute())
     return (*files, *USERS_OWN) if files else ()
 
 
 TRAINED = "training"  # the stage of networks that no file has
-# cells of one scene whose processes wait for their repeats: each holds some hundred megabytes
+# cells of a scene whose processes wait for repeats: each holds 100 MB
 AT_ONCE = 8
-# Cells of one scene that a process measures, beside those that they are compared with.
+# Cells of one scene that a process measures, beside those compared with.
 TOGETHER = 12
 
 
 def tasks_of(plan: Plan) -> list[Task]:
-    """Return every task of the plan. Raises DeclarationError where an entry names a missing module.
+    """Return every task of the plan. Raises DeclarationError for a missing module.
 
     Tasks are expected to take as long as their garments are large.
     """
@@ -136,7 +136,7 @@ class Schedule:
         )  # fmt: skip
 
     def ground_truth(self, network: Network) -> list[Task]:
-        """Return the simulations that a network learns from: those of motions, then those of clips."""
+        """Return the simulations that a network learns from: of motions, then of clips."""
         simulated = network.training.at(self.preset).simulated
         if simulated is None:
             return []
@@ -156,7 +156,7 @@ class Schedule:
         )  # fmt: skip
 
     def clips(self, garment: str, simulated: Simulated, motions: tuple[str, ...], part: int) -> Task:
-        """Return the task that simulates one part of the augmented clips of these motions."""
+        """Return the task that simulates a part of the augmented clips of motions."""
         entry = find_method(simulated.method)
         clips = clips_of(garment, motions)
         scene = find_garment(garment, self.plan.motions.garments).scene(motions[0]).at(self.preset)
@@ -171,7 +171,7 @@ class Schedule:
         )  # fmt: skip
 
     def network(self, network: Network) -> Task:
-        """Return the task that trains a network, or takes it from a file where the plan wants no trainings.
+        """Return the task that trains a network, or takes it where the plan wants no trainings.
 
         A network of a user's file is trained all the same, unless its file is there.
         """
@@ -214,7 +214,7 @@ class Schedule:
         )  # fmt: skip
 
     def cells(self, cells: list[Cell]) -> Iterator[Task]:
-        """Yield the runs, then repeats in rounds, the order of the methods rotated from round to round.
+        """Yield the runs, then repeats in rounds, methods rotated from round to round.
 
         So a machine that grows slower does not favour whoever came first.
         """
@@ -266,7 +266,7 @@ class Schedule:
         )  # fmt: skip
 
     def _min_time(self, cell: Cell) -> float:
-        """Return the seconds that each of its repeats has to measure, so that it is enough together."""
+        """Return the seconds that each of its repeats has to measure."""
         return self.preset.least_seconds / (self.preset.repeats if "speed" in cell.suites else 1)
 
     def quasi_static(self, scene: Scene) -> Task:
@@ -317,13 +317,13 @@ class Schedule:
         )  # fmt: skip
 
     def _machine(self, device: str = "cpu") -> dict[str, Any]:
-        """Return the machine, as times of another are not reused. device: of a training; else cpu."""
+        """Return the machine: times of another are not reused. device: of a training."""
         facts = provenance.hardware(device)
         names = ("processor", "python", "accelerator")  # one thread works, however many cores there are
         return {"machine": {name: facts.get(name) for name in names} | {"device": device, "threads": 1}}
 
     def _list_scene(self, scene: Scene, *code: str, **inputs: Any) -> dict[str, Any]:
-        """Return inputs and code of a task that builds the scene, these included; its metrics are no part."""
+        """Return inputs and code of a task that builds the scene, with these; not its metrics."""
         declaration = read_entry(scene) | {"timed": scene.timed, "dynamic": scene.dynamic}
         del declaration["metrics"], declaration["counterpart"]
         inputs |= self._machine() | {"scene": declaration}
@@ -347,7 +347,7 @@ class Schedule:
         return inputs
 
     def _motion(self, name: str) -> str:
-        """Return the name of a motion, with the digest of its content where it is of a file.
+        """Return a motion's name, with its digest where it is of a file.
 
         The code that makes an embedded one counts by itself.
         """

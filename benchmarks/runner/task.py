@@ -26,8 +26,8 @@ class Outcome:
         files: names of the files that it has left in the run's folder.
         digests: name -> digest of these files, once the outcome is kept.
         seconds: wall time [s].
-        origin: commit, preset, protocol and hardware of it, once the outcome is known to a run.
-        content: digest of all that other tasks read of it; empty where nothing was kept.
+        origin: its commit, preset, protocol and hardware, once known to a run.
+        content: digest of what other tasks read of it; empty where nothing was kept.
     """
 
     status: str = "ok"
@@ -80,22 +80,21 @@ class Task:
         name: unique among the tasks of its kind; part of file names.
         label: for messages.
         stage: title of the stage of a run that it belongs to.
-        run: does it, in a process: a function of a module, or a partial of one. An exception is a
-            failure.
+        run: does it, in a process: a module's function, or a partial. An exception is a failure.
         inputs: plain values that the outcome depends on.
-        code: folders and files whose content the outcome depends on, see benchmarks.provenance.
-        needs: tasks without whose success it cannot be run; their outcomes count as inputs.
-        reads: tasks whose outcomes it uses where they succeeded; they count as inputs too.
+        code: folders and files that the outcome depends on, see benchmarks.provenance.
+        needs: tasks that must have succeeded; their outcomes count as inputs.
+        reads: tasks whose outcomes it uses where they succeeded; these count too.
         skip: why there is nothing to do, or empty. Such a task leaves no trace.
         files: names of the files that it may leave, removed before it is run again.
-        work: how much it is, compared with others of its stage: the largest begin first.
+        work: how much it is among those of its stage: the largest begin first.
         batch: tasks of one batch are handed out together.
         process: a timed task runs alone on the machine, in the process of this name; others, without a
             name, run side by side in any process.
-        motion: of the assets, all that the process of a timed task needs; empty: it needs no assets.
-        warm_up: compiles kernels in its process beforehand; the deadline does not count.
+        motion: all of the assets that the process of a timed task needs; empty: none.
+        warm_up: compiles kernels in its process before; the deadline does not count.
         deadline: [s] after which its process is ended.
-        silent: whether no row of the results speaks of it: a failure is then said apart.
+        silent: whether no row speaks of it: a failure is then said apart.
     """
 
     kind: str
@@ -124,7 +123,7 @@ class Task:
 
     @property
     def batch_id(self) -> TaskId:
-        """Id of the batch of tasks that it belongs to: they share a process, and its memo."""
+        """Id of its batch of tasks, which share a process, and its memo."""
         return self.kind if not self.process else "", self.process or self.batch or self.name
 
     @property
@@ -134,11 +133,11 @@ class Task:
 
 
 class RunRefused(ValueError):
-    """The run cannot begin: its folder is another run's, or there is no such cluster."""
+    """The run cannot begin, as in another run's folder."""
 
 
 class RunStopped(RuntimeError):
-    """No task can be done any more, as on a full disk: the run ends, and what is finished is kept.
+    """No task can be done any more, as on a full disk: the run ends; what is finished is kept.
 
     The message says why.
     """
@@ -156,8 +155,7 @@ def one_line(error: BaseException) -> str:
 def failure(error: BaseException) -> Outcome:
     """Return the outcome of a task that raised, or whose process died.
 
-    torch's allocator on a CPU raises a plain RuntimeError. Raises RunStopped for what no task is at fault
-    of.
+    torch's allocator on a CPU raises a plain RuntimeError. Raises RunStopped where no task is at fault.
     """
     from reference_sim.files.atomic_files import disk_full
 

@@ -1,4 +1,4 @@
-"""The training motions of a run, simulated in one garment and written as one file for snug.train."""
+"""Training motions, simulated in one garment and written as one file for snug.train."""
 
 from __future__ import annotations
 
@@ -24,16 +24,15 @@ LEARNER = "supervised-vertices"
 
 
 def write_training_motions(garment: str, options: argparse.Namespace, out: Path) -> list[str]:
-    """Simulate what the folder `out`.parts lacks, write the file and remove the folder; return the motions.
+    """Simulate what folder `out`.parts lacks, write the file, remove the folder; return motions.
 
     Raises StudyError where a simulation failed, or did not reach its last frame.
     """
     study = study_of(options, "full:garments")
+    study = replace(study, scenes=(f"{garment}/*",), methods=(LEARNER,))
     run = RunFolder(out.with_name(f"{out.name}.parts"))
     # A plan wants a new folder that can be made; nothing is written there.
-    plan = make_plan(
-        replace(study, scenes=(f"{garment}/*",), methods=(LEARNER,)), folder=run.path / "new"
-    )
+    plan = make_plan(study, folder=run.path / "new")
     assets = plan.open_assets()
     schedule, network = Schedule(plan), Network(LEARNER, 0, garment)
     with held(run.path):

@@ -1,6 +1,6 @@
 """Scene that a stored roll-out brings itself: cloth at rest from a mesh, body, and start from the file.
 
-So the pickles of HOOD and ContourCraft are judged, which name no motion and no garment.
+So the pickles of HOOD and ContourCraft are measured, which name no motion and no garment.
 """
 
 from __future__ import annotations
@@ -20,10 +20,10 @@ from reference_sim.material import Material
 from reference_sim.obstacle import Obstacle
 
 FPS = 30.0  # where neither the file nor the user says another rate
-LARGEST, GARMENT = 20.0, (0.2, 4.0)  # [m] across: of any cloth; from and to, of one that is worn
+CLOTH, GARMENT = (0.02, 20.0), (0.2, 4.0)  # [m] across, from and to: of any cloth; of one that is worn
 # Vertices are no neighbours whose edges are in the mean so many times as long as at rest.
 LONGEST_STRETCH = 3.0
-MIN_FRAMES = 4  # frames: two are not judged, and a mean is of more than one
+MIN_FRAMES = 4  # frames: two are not evaluated, and a mean is of more than one
 
 
 def declare_scene(option: RollOutOption, rest_mesh: str) -> Scene:
@@ -57,6 +57,8 @@ def build(
     positions = to_metres_y_up(stored.positions, units=units, up=up)
     if len(positions) < MIN_FRAMES:
         raise RollOutFileError(f"{path}: {len(positions)} frames; at least {MIN_FRAMES} are needed")
+    if fps and stored.fps and fps != stored.fps:
+        raise RollOutFileError(f"{path}: says {stored.fps:g} frames a second, fps={fps:g}: leave fps out")
     try:
         rest = read_mesh(rest_mesh)
         if len(rest.positions) != positions.shape[1]:
@@ -93,11 +95,11 @@ def build(
 
 
 def _demand_a_size(rest_positions: np.ndarray, rest_mesh: str, units: str) -> None:
-    """Raise RollOutFileError for a cloth (V,3) [m] that is a garment in a smaller unit."""
+    """Raise RollOutFileError for a cloth (V,3) [m] that is a garment in another unit."""
     across = float(np.linalg.norm(np.ptp(rest_positions, axis=0)))
     low, high = GARMENT
     fit = [f"units={unit}" for unit, m in METRES.items() if low <= across / METRES[units] * m <= high]
-    if across > LARGEST and fit:
+    if fit and not CLOTH[0] <= across <= CLOTH[1]:
         raise RollOutFileError(
             f"{rest_mesh}: the cloth is {across:.3g} m across in units={units}: say {' or '.join(fit)}"
         )

@@ -43,8 +43,8 @@ class Case:
     Attributes:
         name: unique over all cases, and the row's scene unless `scene` is given.
         module: dotted, or a path that ends with .py.
-        smoke: whether the smallest preset runs it.
-        long: whether it is left out where no suite is named.
+        smoke: whether `{smoke}` of a study means it.
+        long: whether `{short}` of a study leaves it out.
         seconds: after which the case's process is ended; None: never.
         method: of its row.
         process: where it has a name, the case is timed: it runs alone on the machine, in the process of
@@ -115,7 +115,11 @@ _declared: dict[str, list[Case]] = defaultdict(list)  # by module
 
 
 def known_answer(
-    cases: Sequence[str] | Mapping[str, Mapping[str, Any]] = (), /, *, smoke: bool = True, **declared: Any
+    cases: str | Sequence[str] | Mapping[str, Mapping[str, Any]] = (),
+    /,
+    *,
+    smoke: bool = True,
+    **declared: Any,
 ) -> Callable[[Function], Function]:
     """Declare a function as one or more cases: their names, or name -> options of the function.
 
@@ -133,7 +137,8 @@ def known_answer(
 
     def declare(function: Function) -> Function:
         sentence = (inspect.getdoc(function) or "").partition("\n\n")[0].removeprefix("Return the ")
-        named = cases if isinstance(cases, Mapping) else {name: {} for name in cases}
+        names = (cases,) if isinstance(cases, str) else cases
+        named = names if isinstance(names, Mapping) else {name: {} for name in names}
         for name, options in (named or {function.__name__: {}}).items():
             values = ", ".join(f"{option} = {value}" for option, value in options.items())
             description = f"{sentence.rstrip('.')}: {values}".removesuffix(": ")

@@ -118,7 +118,7 @@ BODIES: dict[str, Callable[[], sim.Obstacle]] = {
 
 STIFF_HINGE = {"start": "folded by 180", "speed": "closing at 30 rad/s", "bending": 1e4}
 ONE_POINT = {"start": "point", "terms": "membrane", "pins": "none", "speed": 0.0}
-SMOKE: dict[str, dict[str, Any]] = {  # run by the smallest preset too
+SMOKE: dict[str, dict[str, Any]] = {  # what `{smoke}` of a study means
     "stiffness_x1000": {"stiffness": 1e3},
     "time_step_1s": {"dt": 1.0},
     "squeezed_70": {"start": "squeezed to 30 %", "speed": 0.0},

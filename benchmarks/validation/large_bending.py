@@ -5,14 +5,11 @@ gives the force at each of its points; integrated by scipy.
 
 Lateral buckling: a strip on edge, clamped at one end, gives way sideways under P = 4.0126 (EI GJ)^0.5 /
 L^2 at the other end (Michell 1899, Prandtl 1899), or 12.85 (EI GJ)^0.5 / L^2 spread evenly over the
-length (Timoshenko and Gere, Theory of Elastic Stability), the limit of narrow strips of the test of
-Romero et al.
-2021. Of a narrow strip of width b on equilateral triangles EI = D (1 - nu^2) b and GJ = 2 D (1 - nu) b.
+length (Timoshenko and Gere, Theory of Elastic Stability), as tested by Romero et al. (2021). Of a narrow strip of width b on equilateral triangles EI = D (1 - nu^2) b and GJ = 2 D (1 - nu) b.
 
 Slit annular plate (Sze, Liu and Lo 2004): clamped at one lip of the slit, the other lifted by a line
 load. Equilateral triangles are mapped to the annulus by exp, which is conformal. Such a plate has nu =
--1/3, and the energy of Gaussian curvature makes it one of nu = 0; without that term the load lifts it
-less.
+-1/3, and the energy of Gaussian curvature makes it one of nu = 0.
 """
 
 from __future__ import annotations
@@ -63,7 +60,7 @@ def bent_strip(
     free = rest[:, 0] > strip.cell
     guess[free, 0] = np.interp(rest[free, 0], s, x)
     guess[free, 1] = -np.interp(rest[free, 0], s, drop)
-    strength = (weight + load) * strip.stiffness / ELASTICA_MATERIAL.areal_density / 9.81
+    strength = (weight + load) * strip.stiffness / ELASTICA_MATERIAL.areal_density / sim.GRAVITY
     bent = minimum(terms, guess, tolerance=1e-6 * strength)
     return strip.chord(bent) / length, np.array([x[-1], drop[-1]])
 

@@ -10,7 +10,7 @@ from reference_sim.energies import Energy
 from reference_sim.kernels.kernel_cache import njit
 from reference_sim.kernels.lanes import (
     FAST,
-    LANES_FLOAT32,
+    LANES,
     TINY,
     Float32Lanes,
     empty_state,
@@ -23,7 +23,7 @@ from reference_sim.kernels.lanes import (
 def spring_gradient(data, u, gradient, scratch):
     """Add the gradient at displacements u to `gradient`; return the energy."""
     vertices, constants, edges = data
-    L, half, total = LANES_FLOAT32, np.float32(0.5), 0.0
+    L, half, total = LANES, np.float32(0.5), 0.0
     for b in range(len(vertices)):
         for g in range(L):
             i, j = vertices[b, g], vertices[b, L + g]

@@ -50,20 +50,20 @@ def main() -> None:
     parser.add_argument("--recipes", nargs="+", choices=RECIPES, default=["paper", "paper-contact"])
     parser.add_argument("--motions", nargs="+", default=MOTIONS)
     parser.add_argument("--steps", type=int, default=KEPT[-1])
-    given = parser.parse_args()
-    folder: Path = given.folder
+    options = parser.parse_args()
+    folder: Path = options.folder
     folder.mkdir(exist_ok=True)
     torch.set_num_threads(1)
     preset = find_preset("quick")
-    assets = open_assets(preset, make_motions(given.motions), ["tshirt"])
+    assets = open_assets(preset, make_motions(options.motions), ["tshirt"])
     dressed = DressedBody(assets.body, assets.garments["tshirt"])
-    recipes = [RECIPES[name] for name in given.recipes]
-    kept = [steps for steps in KEPT if steps <= given.steps]
+    recipes = [RECIPES[name] for name in options.recipes]
+    lengths = [steps for steps in KEPT if steps <= options.steps]
     for recipe in recipes:
-        train(dressed, recipe, kept, folder)
-    for motion in given.motions:
+        train(dressed, recipe, lengths, folder)
+    for motion in options.motions:
         scene = GARMENT_SCENES[0].scene(motion).at(preset).build(assets)
-        compare(scene, motion, recipes, kept, folder)
+        compare(scene, motion, recipes, lengths, folder)
 
 
 def weights_file(folder: Path, recipe: str, steps: int) -> Path:
@@ -92,19 +92,19 @@ def compare(scene: BuiltScene, motion: str, recipes: list[Recipe], kept: list[in
     scenes = {recipe.name: swap_energies(scene, recipe) for recipe in recipes}
     dressed = DressedBody(scene.dressed.body, scene.dressed.garment)
     positions = {"skinning": dressed.skin(scene.dressed.motion, smoothing=DEFAULT.smoothing)}
-    for name, own in scenes.items():
+    for name, variant in scenes.items():
         path = folder / f"{motion}-{name}.npy"
         if not path.exists():
-            np.save(path, simulated(own))
+            np.save(path, simulated(variant))
         positions[f"simulation, {name}"] = np.load(path)
         for steps in kept:
             network = Network(weights_file(folder, name, steps))
             network.prepare(scene)
             positions[f"{name}, {steps} steps"] = network.run().positions
-    for name, own in scenes.items():
-        series = energy_series(own, list(positions.values()))
+    for name, variant in scenes.items():
+        series = energy_series(variant, list(positions.values()))
         means = {
-            key: {term: float(values[own.warm_up :].mean()) for term, values in of.items()}
+            key: {term: float(values[variant.warm_up :].mean()) for term, values in of.items()}
             for key, of in zip(positions, series)
         }
         zero, full = means[f"simulation, {name}"]["total"], means["skinning"]["total"]

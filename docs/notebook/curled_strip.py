@@ -56,22 +56,22 @@ def smallest(curvature: float, gamma: float, shape, torsion: float, edge: float)
 if __name__ == "__main__":
     for curvature in (1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0):
         for way, start in (("up", curvature), ("down", 0.0)):
-            s, found = np.linspace(0, 1, 60), []
+            s, eigenvalues = np.linspace(0, 1, 60), []
             y = np.stack([start * s, start + 0 * s])
             for gamma in GAMMAS if way == "up" else GAMMAS[::-1]:
                 shape = planar_shape(curvature, gamma, s, y)
                 if not shape.success:
                     break
                 s, y = shape.x, shape.y
-                found.append(
+                eigenvalues.append(
                     (gamma, [smallest(curvature, gamma, shape, *body) for body in BODIES.values()])
                 )
-            if not found:
+            if not eigenvalues:
                 continue
             for which, body in enumerate(BODIES):
-                least = min(values[which] for _, values in found)
-                below = [f"{gamma:.3g}" for gamma, values in found if values[which] < 0]
+                least = min(values[which] for _, values in eigenvalues)
+                below = [f"{gamma:.3g}" for gamma, values in eigenvalues if values[which] < 0]
                 print(
-                    f"kappa L {curvature:g}, {way} to Gamma {found[-1][0]:.3g}, {body}:",
+                    f"kappa L {curvature:g}, {way} to Gamma {eigenvalues[-1][0]:.3g}, {body}:",
                     f"smallest {least:.3f}, negative at {', '.join(below) or 'none'}",
                 )

@@ -66,8 +66,8 @@ class NoisyCopies:
         values[self.timed] *= np.exp(0.05 * random.standard_normal(self.timed.sum()))
         for group in self.scatter:
             alike = {seed: random.standard_normal() for seed in sorted(set(group.seeds))}
-            own = random.standard_normal(len(group.places))
-            new = group.mean + group.deviation * (own + group.seeds.map(alike).to_numpy()) / np.sqrt(2.0)
+            z = random.standard_normal(len(group.places))
+            new = group.mean + group.deviation * (z + group.seeds.map(alike).to_numpy()) / np.sqrt(2.0)
             values[group.places] = np.exp(new) if group.positive else new
         unsure = self.rows["uncertainty"].fillna(0.0).to_numpy(dtype=float)[self.unseeded]
         values[self.unseeded] += unsure * random.standard_normal(self.unseeded.sum())

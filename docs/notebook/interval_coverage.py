@@ -26,8 +26,8 @@ def excesses(random: np.random.Generator, motions: int, seeds: int, spread: floa
     noise = random.normal(0.0, NOISE, (motions, 1))
     grids = []
     for scale in (1.0, factor):
-        own = random.normal(0.0, SEEDS, (1, seeds)) + random.normal(0.0, CELLS, (motions, seeds))
-        grids.append(scale * MEDIAN * np.exp(shared + own) + noise)
+        errors = random.normal(0.0, SEEDS, (1, seeds)) + random.normal(0.0, CELLS, (motions, seeds))
+        grids.append(scale * MEDIAN * np.exp(shared + errors) + noise)
     return grids
 
 

@@ -71,13 +71,13 @@ class Training:
     def live(self, seconds: float, *, of_all: bool) -> Kill | None:
         """Run until `seconds` of training have gone, then kill; None if the model is there before."""
         self.began.unlink(missing_ok=True)
-        with tempfile.TemporaryFile() as said:
-            run = subprocess.Popen(self.command, stdout=said, stderr=said, start_new_session=True)
+        with tempfile.TemporaryFile() as output:
+            run = subprocess.Popen(self.command, stdout=output, stderr=output, start_new_session=True)
             begun = float("inf")
             while not self.model.is_file() and time.time() < begun + seconds:
                 if run.poll() is not None:
-                    said.seek(0)
-                    raise RuntimeError(said.read().decode()[-2000:])
+                    output.seek(0)
+                    raise RuntimeError(output.read().decode()[-2000:])
                 if begun == float("inf") and self.began.is_file():
                     begun = self.began.stat().st_mtime
                 time.sleep(0.01)

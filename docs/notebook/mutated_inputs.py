@@ -320,15 +320,15 @@ class TextKind(Kind):
         chosen = ([draw.choice(refused)] if spoil else []) + draw.sample(
             same, draw.randint(0 if spoil else 1, 2)
         )
-        text, done = path.read_text(encoding="utf-8"), []
+        text, differences = path.read_text(encoding="utf-8"), []
         for mutation in chosen:
             before = text
             text = mutation(text, draw)
-            done.append(f"{getattr(mutation, '__name__', mutation)}: {difference(before, text)}")
+            differences.append(f"{getattr(mutation, '__name__', mutation)}: {difference(before, text)}")
             if spoil and text == before and mutation is chosen[0]:
                 return []
         path.write_bytes(text.encode("utf-8", errors="surrogateescape"))
-        return done
+        return differences
 
 
 class ArrayKind(Kind):

@@ -11,7 +11,7 @@ import numpy as np
 
 from reference_sim.kernels.fast_kernels import (
     GUARDED,
-    TRAINING_LANES,
+    LANES,
     BatchKernel,
     Constraints,
     VertexBlocks,
@@ -30,7 +30,7 @@ from reference_sim.kernels.lanes import (
     lay_out,
     set_edges,
 )
-from reference_sim.kernels.lanes import LANES_FLOAT32 as L
+from reference_sim.kernels.lanes import LANES as L
 
 if TYPE_CHECKING:
     from reference_sim.energies.bend_hinge import BendHinge
@@ -70,7 +70,7 @@ def arctan2(y: np.float32, x: np.float32) -> np.float32:
 @njit(cache=True, fastmath=GUARDED, error_model="numpy")
 def _bending(x, hinges, stiffness, rest, values, gradients):
     """Set values [J] and add to gradients [N]; d theta / d x_a = +- w_a n / |n|^2, as in definition."""
-    L = TRAINING_LANES
+    L = LANES
     u, energy, total = np.empty(12 * L, np.float32), np.empty(L, np.float32), np.empty(L)
     for block in range(len(values)):
         total[:] = 0.0
@@ -128,7 +128,7 @@ def lanes(term: BendHinge) -> Float32Lanes:
 def hinge_gradient(data, u, gradient, s):
     """Return the energy [J] of the hinges and add to gradient (3V,) [N].
 
-    With L for LANES_FLOAT32: vertices (B, 4 L): 3 times the vertex. constants (B, 2 L): stiffness [J],
+    With L for LANES: vertices (B, 4 L): 3 times the vertex. constants (B, 2 L): stiffness [J],
     rest angle [rad]. edges (B, 9 L): of x_0.
     """
     vertices, constants, edges = data

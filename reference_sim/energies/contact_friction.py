@@ -83,7 +83,8 @@ class ContactFriction(Energy):
         """Return mu N (S,) [N] of samples (S, 3) [m] on planes."""
         gap = np.einsum("si,si->s", normals, samples - points)
         depth = np.maximum(self.contact.margin - gap, 0.0)
-        return self.coefficient * 3 * self.contact.stiffness * depth**2
+        power = self.contact.power
+        return self.coefficient * power * self.contact.stiffness * depth ** (power - 1)
 
     def _demand_forces(self) -> np.ndarray:
         if self.forces is None:
@@ -108,7 +109,7 @@ class ContactFriction(Energy):
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
-        gradient = np.zeros_like(x)
+        x, gradient = self.start_gradient(x)
         state = (self._demand_forces(), self.anchors, self.normals, self.threshold)
         return _gradient(x, self.stencils, self.weights, *state, gradient), gradient
 

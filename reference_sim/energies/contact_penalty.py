@@ -23,7 +23,7 @@ from reference_sim.geometry.closest_point import arrange
 from reference_sim.kernels.fast_kernels import Constraints, VertexBlocks
 from reference_sim.kernels.kernel_cache import njit
 from reference_sim.kernels.lanes import FAST, THREE, Float32Lanes, empty_state, lay_out, to_blocks
-from reference_sim.kernels.lanes import LANES_FLOAT32 as L
+from reference_sim.kernels.lanes import LANES as L
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -83,7 +83,7 @@ def _longest(u):
 def contact_gradient(data, u, gradient, s):
     """Return the energy [J] of the contact penalty and add to gradient (3V,) [N].
 
-    deepest (B,): largest depth of a block at x_0 [m]. With L for LANES_FLOAT32: vertices (B, 3 L): 3
+    deepest (B,): largest depth of a block at x_0 [m]. With L for LANES: vertices (B, 3 L): 3
     times the vertex. constants (B, 4 L): weights, stiffness [J/m^3]. planes (B, 4 L): normal, and the
     depth of x_0 under the margin [m], below zero above it. No sample moves farther than the vertex that
     moves most, so a block that is higher than that is not visited.
@@ -290,20 +290,13 @@ class ContactPenalty(Energy):
         self.planes, self.points, self.normals = planes, planes.points, planes.normals
         self.step = step
 
-    def energy(self, x: Tensor, points: Tensor | None = None, normals: Tensor | None = None) -> Tensor:
-        """Return E [J] of each sample: x (..., V, 3), points and normals (..., S, 3) [m] -> (..., S).
-
-        Planes default to the prepared ones.
-        """
-        import torch
-
-        index = torch.as_tensor(self.stencils, device=x.device)
-        return self.element_energy(x[..., index, :], points, normals)
-
     def element_energy(
         self, u: Tensor, points: Tensor | None = None, normals: Tensor | None = None
     ) -> Tensor:
-        """Return E [J] of each sample: u (..., N, 3, 3) [m] -> (..., N)."""
+        """Return E [J] of each sample: u (..., N, 3, 3) [m] -> (..., N).
+
+        points, normals: (..., N, 3) [m], of planes in place of the prepared ones.
+        """
         import torch
 
         c = torch.as_tensor(self.points).to(u) if points is None else points
@@ -314,7 +307,7 @@ class ContactPenalty(Energy):
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
-        gradient = np.zeros_like(x)
+        x, gradient = self.start_gradient(x)
         planes = self.points, self.normals
         value = _gradient(x, self.stencils, self.weights, self.stiffness, self.margin, *planes, gradient)
         return value, gradient

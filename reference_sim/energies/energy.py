@@ -58,8 +58,8 @@ class Energy:
             is minimised without it first, for it is zero wherever nothing is near.
         constant: block sizes (3: Hessian, 1: scalar stiffness) of which the term gives the same at every
             x and in every step.
-        remembers: whether `prepare` reads what the step before has left. Where no term does, a step can
-            be judged without preparing the one before it.
+        remembers: whether `prepare` reads the step before, which then has to be prepared first to evaluate
+            a single step.
         kernels: functions by use, see kernels.fast_kernels. A subclass does not inherit them.
     """
 
@@ -82,12 +82,15 @@ class Energy:
             lines = "; ".join(f"{name} = Energy.{name}" for name in foreign)
             raise TypeError(f"{cls.__name__} would inherit closed forms of another energy: write {lines}")
 
-    def energy(self, x: Tensor) -> Tensor:
-        """Return the energy of each element [J]: x (..., V, 3) [m] -> (..., N). This is the definition."""
+    def energy(self, x: Tensor, *state: Tensor) -> Tensor:
+        """Return the energy of each element [J]: x (..., V, 3) [m] -> (..., N). This is the definition.
+
+        state: in place of what `prepare` has frozen, where `element_energy` takes it.
+        """
         import torch
 
         index = torch.as_tensor(self.stencils, device=x.device)
-        return self.element_energy(x[..., index, :])
+        return self.element_energy(x[..., index, :], *state)
 
     def element_energy(self, u: Tensor) -> Tensor:
         """Return the energy of each element from its own vertices: u (..., N, k, 3) [m] -> (..., N) [J]."""
@@ -106,6 +109,16 @@ class Energy:
         Names end in their unit; "vertices" (N, k) are the stencils.
         """
         return {"vertices": self.stencils}
+
+    def start_gradient(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return x (V, 3) as kernels take it, which look at no bounds, and a gradient of zeros to add to.
+
+        Raises ValueError for another shape.
+        """
+        x = np.ascontiguousarray(x, dtype=np.float64)
+        if x.shape != (shape := (self.cloth.vertex_count, 3)):
+            raise ValueError(f"positions have shape {x.shape}: expected {shape} [m]")
+        return x, np.zeros_like(x)
 
     def _elements(self, x: np.ndarray) -> Tensor:
         import torch

@@ -5,13 +5,13 @@ x_hat holds no gravity: the weight is a term of its own, so a body in free fall 
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from reference_sim.cloth import Cloth
 from reference_sim.energies.energy import Energy, Step, demand_positive
-from reference_sim.kernels.fast_kernels import TRAINING_LANES, BatchKernel
+from reference_sim.kernels.fast_kernels import LANES, BatchKernel
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -22,7 +22,6 @@ class Inertia(Energy):
 
     name = "inertia"
     constant = (1, 3)
-    kernels: ClassVar = {"vertex_inertia": lambda term: term.masses / term.dt**2}
 
     def __init__(self, cloth: Cloth, dt: float) -> None:
         demand_positive("Inertia", dt=dt)
@@ -40,11 +39,11 @@ class Inertia(Energy):
         """Set x_hat = x_t + dt v_t."""
         self.x_hat = step.previous + step.dt * step.velocity
 
-    def energy(self, x: Tensor, x_hat: Tensor | None = None) -> Tensor:
-        """Return E [J] (..., V) of each vertex at x (..., V, 3) [m]; by default x_hat is prepared."""
+    def energy(self, x: Tensor, *state: Tensor) -> Tensor:
+        """Return E [J] (..., V) of each vertex at x (..., V, 3) [m]; state: x_hat, else the prepared one."""
         import torch
 
-        target = torch.as_tensor(self.x_hat).to(x) if x_hat is None else x_hat
+        (target,) = state or (torch.as_tensor(self.x_hat).to(x),)
         mass = torch.as_tensor(self.masses).to(x)
         return 0.5 / self.dt**2 * mass * ((x - target) ** 2).sum(-1)
 
@@ -71,11 +70,11 @@ def batch_of_windows(term: Inertia, ahead: np.ndarray, windows: int, weight: flo
     """Return the kernel of training on a CPU, of windows that fill whole blocks.
 
     E = weight m / (2 dt^2) |a|^2 with a = x_t - 2 x_{t-1} + x_{t-2} - ahead_t, zero for the first two
-    frames. ahead (C, 3, TRAINING_LANES) [m]: where the frame before would be if nothing pulled, seen from
+    frames. ahead (C, 3, LANES) [m]: where the frame before would be if nothing pulled, seen from
     where it is.
     """
     stiffness = (weight * term.masses / term.dt**2).astype(np.float32)[:, None, None]
-    one = windows // TRAINING_LANES  # blocks a frame
+    one = windows // LANES  # blocks a frame
 
     def run(x: np.ndarray, gradients: np.ndarray) -> np.ndarray:
         a = x[2 * one :] - x[one:-one]
@@ -85,7 +84,7 @@ def batch_of_windows(term: Inertia, ahead: np.ndarray, windows: int, weight: flo
         force = stiffness * a
         gradients[2 * one :] += force
         a *= force
-        values = np.zeros((len(x), TRAINING_LANES), np.float32)
+        values = np.zeros((len(x), LANES), np.float32)
         values[2 * one :] = 0.5 * a.sum((1, 2), dtype=np.float64)
         gradients[: -2 * one] += force
         force += force

@@ -11,7 +11,7 @@ import numpy as np
 
 from reference_sim.kernels.fast_kernels import (
     GUARDED,
-    TRAINING_LANES,
+    LANES,
     BatchKernel,
     Constraints,
     VertexBlocks,
@@ -30,7 +30,7 @@ from reference_sim.kernels.lanes import (
     lay_out,
     set_edges,
 )
-from reference_sim.kernels.lanes import LANES_FLOAT32 as L
+from reference_sim.kernels.lanes import LANES as L
 
 if TYPE_CHECKING:
     from reference_sim.energies.stretch_stvk import StretchStVK
@@ -52,7 +52,7 @@ def lanes(term: StretchStVK) -> Float32Lanes:
 def membrane_gradient(data, u, gradient, s):
     """Return the energy [J] of StVK and add to gradient (3V,) [N].
 
-    With L for LANES_FLOAT32: vertices (B, 3 L): 3 times the vertex. constants (B, 5 L): Dm^-1 by rows,
+    With L for LANES: vertices (B, 3 L): 3 times the vertex. constants (B, 5 L): Dm^-1 by rows,
     rest area. edges (B, 6 L): of x_0.
     """
     vertices, constants, edges, lam, mu = data
@@ -116,7 +116,7 @@ def batch(term: StretchStVK) -> BatchKernel:
 @njit(cache=True, fastmath=GUARDED, error_model="numpy")
 def _strain(x, faces, Dm_inverse, areas, lam, mu, values, gradients):
     """Set values [J] and add dE/dx_a = A F S b_a to gradients [N], as in definition."""
-    L = TRAINING_LANES
+    L = LANES
     u, energy, total = np.empty(9 * L, np.float32), np.empty(L, np.float32), np.empty(L)
     for block in range(len(values)):
         total[:] = 0.0

@@ -15,9 +15,9 @@ NO_ROOM_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
-    """Give a temporary name beside `path`: renamed to it when the block ends well, removed when it does not.
+    """Give a temporary name beside `path`: renamed to it when the block ends well, else removed.
 
-    The file that was there before stays until the new one is on the disk. OSError names `path`, too.
+    The file that was there before stays until the new one is on the disk. OSError of a full disk names it.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
     # A name that nobody can foresee: a link that lay there would be followed.
@@ -41,11 +41,16 @@ def demand_new(folder: Path) -> None:
         raise ValueError(f"{folder}: is there already; name a new folder")
 
 
-def demand_writable_folder(folder: Path) -> None:
-    """Raise ValueError where nothing can be written into a folder, or the folder cannot be made."""
+def is_writable(folder: Path) -> bool:
+    """Return whether files can be written into a folder, or the folder can be made."""
     place = next(place for place in (folder, *folder.absolute().parents) if place.exists())
-    if not (place.is_dir() and os.access(place, os.W_OK | os.X_OK)):
-        raise ValueError(f"{place}: cannot be written to; name another folder")
+    return place.is_dir() and os.access(place, os.W_OK | os.X_OK)
+
+
+def demand_writable_folder(folder: Path) -> None:
+    """Raise ValueError unless `is_writable`."""
+    if not is_writable(folder):
+        raise ValueError(f"{folder}: cannot be written to; name another folder")
 
 
 @contextmanager
@@ -56,7 +61,7 @@ def new_folder(folder: Path) -> Iterator[Path]:
     """
     demand_new(folder)
     target = folder.resolve()
-    part = target.with_name(f".{target.name}.{os.getpid()}.part")
+    part = target.with_name(f".{target.name}.{secrets.token_hex(8)}.part")
     try:
         part.mkdir(parents=True)
     except OSError as error:
@@ -80,4 +85,4 @@ def disk_full(error: BaseException) -> str:
     folder = next((parent for parent in path.parents if parent.is_dir()), Path())
     free = shutil.disk_usage(folder).free / 1e6
     name = error.filename or "a file"
-    return f"{name}: {error.strerror} ({free:.3g} MB are free there); what was finished is kept"
+    return f"{name}: {error.strerror} ({free:.3g} MB are free there)"

@@ -154,7 +154,7 @@ def _sort(paths: list[Path]) -> list[Path]:
     steps = [end - start for start, end in pairwise(map(number.__getitem__, frames))]
     usual = mode(steps) if steps else 0
     for path, follower, step in zip(frames, frames[1:], steps):
-        if step != usual:
+        if step != usual or step == 0:
             raise MeshError(
                 f"{follower}: its number is {step} above that of {path.name}, and others follow by {usual}: "
                 "add the frames that are missing, or number the files evenly"

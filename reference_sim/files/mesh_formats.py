@@ -143,7 +143,7 @@ def _read_ply(path: Path) -> Contents:
         match line.split():
             case ["format", kind, _] if kind in PLY_ORDER:
                 order = PLY_ORDER[kind]
-            case ["element", name, count]:
+            case ["element", name, count] if count.isdecimal():
                 elements.append((name, int(count), {}))
             case ["property", "list", size, kind, name] if elements and name not in elements[-1][2]:
                 elements[-1][2][name] = PLY_NUMBERS[size] + PLY_NUMBERS[kind]

@@ -11,10 +11,11 @@ from collections import namedtuple
 
 import numpy as np
 
+from reference_sim.kernels.fast_kernels import LANES
 from reference_sim.kernels.kernel_cache import njit
 from reference_sim.kernels.lanes import bits_at_most, lowest_bit
 
-LANES = 16  # faces of a leaf, leaves of a block and samples of a group
+# LANES: faces of a leaf, leaves of a block and samples of a group
 QUANTITIES = 21  # of a face, for its bound
 BOUND_MATH = {"nnan", "nsz", "reassoc", "contract"}  # for bounds alone, within ROUND_OFF
 ROUND_OFF = 3e-6  # of lengths, of the bounds: some fifty times that of float32

@@ -101,7 +101,7 @@ def _leads_nearer(offset, c, face, weights, vertices, faces, starts, around):
 def plane_normals(points, closest, closest_faces, barycentric, vertices, faces, starts, around, normals):
     """Write the normals (S, 3) from the closest points to the samples, turned outwards.
 
-    Returns the samples farther away than TANGENT_BALL whose plane is nearer.
+    Returns the samples (n,) farther than TANGENT_BALL whose normal was tilted away from their offset.
 
     A sample that looks along the surface, or is below it and beyond the border of the faces that it may
     meet (another face at the closest point c leads nearer), meets a ball that touches the surface in c

@@ -75,7 +75,7 @@ def check_closed(positions: np.ndarray, faces: np.ndarray) -> None:
         raise MeshError(
             f"obstacle {positions.shape} and faces {faces.shape}: expected (T, B, 3) and (F, 3)"
         )
-    if faces.min() < 0 or faces.max() >= positions.shape[1]:
+    if not np.isin(faces, np.arange(positions.shape[1])).all():
         raise MeshError(f"obstacle faces name a vertex outside 0..{positions.shape[1] - 1}")
     if not np.isfinite(positions).all():
         frame, vertex, _ = np.argwhere(~np.isfinite(positions))[0]

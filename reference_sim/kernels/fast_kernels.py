@@ -2,7 +2,6 @@
 
 The class attribute `kernels` of an `Energy` has, by use, a function of the term that gives
 
-    vertex_inertia  (V,) [N/m] of a pull towards term.x_hat: early-stopped L-BFGS, block descent, XPBD
     vertex_weights  (V,) [N] of a constant pull along -y: early-stopped L-BFGS, block descent, XPBD
     float32_lanes   kernels.lanes.Float32Lanes: early-stopped L-BFGS, and the start of LBFGS
     vertex_block    VertexBlocks: vertex block descent
@@ -14,7 +13,7 @@ term.
 
 Gauss-Seidel sweeps (vertex block descent, XPBD) move vertices between one element and the next, so their
 kernels work on one element at a time, in float64. Training on a CPU evaluates one mesh in some fifty
-configurations, so each element is worked out for TRAINING_LANES of them at once, in float32 and in the
+configurations, so each element is worked out for LANES of them at once, in float32 and in the
 layout of snug.kernels.skinning.
 """
 
@@ -32,8 +31,6 @@ if TYPE_CHECKING:
     from reference_sim.energies.energy import Energy
     from reference_sim.energies.inertia import Inertia
     from reference_sim.potential import Potential
-
-OF_VERTICES = ("vertex_inertia", "vertex_weights")
 
 
 class SlowPathWarning(UserWarning):
@@ -57,7 +54,7 @@ def fast_kernel(term: Energy, use: str) -> Any:
 class StepTerms:
     """The terms of a time step, for solvers that build in what belongs to single vertices."""
 
-    inertia: Inertia  # declares "vertex_inertia"
+    inertia: Inertia
     weighing: tuple[Energy, ...]  # declare "vertex_weights"
     weights: np.ndarray  # (V,) [N] of all of these
     elements: tuple[Energy, ...]  # all other terms, in the order of the potential
@@ -74,13 +71,14 @@ def step_terms(potential: Potential, use: str, solver: str) -> StepTerms:
             f"{solver} has no kernel for the term {term.name!r}: use newton or lbfgs, or declare one "
             "(docs/extend.md, An energy)"
         )
-    inertia, weighing = ([e for e in potential.energies if has_kernel(e, part)] for part in OF_VERTICES)
-    if len(inertia) != 1:
-        raise ValueError(f"{solver} takes steps in time: the potential needs inertia, once")
+    inertia: Any = next((e for e in potential.energies if e.name == "inertia"), None)
+    if inertia is None:
+        raise ValueError(f"{solver} takes steps in time: the potential needs inertia")
+    weighing = [e for e in potential.energies if has_kernel(e, "vertex_weights")]
     weights = [fast_kernel(term, "vertex_weights") for term in weighing]
     elements = tuple(term for term in potential.energies if has_kernel(term, use))
     return StepTerms(
-        inertia=inertia[0],  # type: ignore[arg-type]
+        inertia=inertia,
         weighing=tuple(weighing),
         weights=sum(weights[1:], weights[0]) if weights else np.zeros(potential.cloth.vertex_count),
         elements=elements,
@@ -90,7 +88,10 @@ def step_terms(potential: Potential, use: str, solver: str) -> StepTerms:
 
 def terms_without_kernel(potential: Potential, use: str) -> list[Energy]:
     """Return the terms that a solver of time steps with kernels for this use could not take."""
-    return [e for e in potential.energies if not any(has_kernel(e, kind) for kind in (*OF_VERTICES, use))]
+    return [
+        e for e in potential.energies
+        if e.name != "inertia" and not (has_kernel(e, "vertex_weights") or has_kernel(e, use))
+    ]  # fmt: skip
 
 
 def warn_slow_path(asker: str, kernel: str, terms: Sequence[Energy], instead: str) -> None:
@@ -135,11 +136,11 @@ class Constraints:
     freeze: Callable[[], tuple[Any, ...]]  # gives `data` as the step has it, with multipliers of zero
 
 
-TRAINING_LANES = 16
+LANES = 16  # float32 numbers that a kernel works on side by side, so many of whatever they belong to
 # No assumption on NaN or infinity: the guard of training must see them.
 GUARDED = {"reassoc", "contract", "arcp", "nsz"}
 
-# x (C, V, 3, TRAINING_LANES) float32 [m] -> values (C, TRAINING_LANES) [J]; the second argument is like
+# x (C, V, 3, LANES) float32 [m] -> values (C, LANES) [J]; the second argument is like
 # x, and the gradients [N] are added to it. The function for "training_batch" returns one.
 BatchKernel = Callable[[np.ndarray, np.ndarray], np.ndarray]
 
@@ -150,7 +151,7 @@ def batch_kernel(kernel: Any, stencils: np.ndarray, *constants: Any) -> BatchKer
     stencils = stencils.astype(np.uint32)
 
     def run(x: np.ndarray, gradients: np.ndarray) -> np.ndarray:
-        values = np.empty((len(x), TRAINING_LANES), np.float32)
+        values = np.empty((len(x), LANES), np.float32)
         kernel(x.ravel(), stencils, *constants, values, gradients.ravel())
         return values
 

@@ -7,10 +7,9 @@ with the same sources find the same folder.
 
 The folders lie in `__pycache__` beside the module, else in the user's cache folder, or in NUMBA_CACHE_DIR.
 
-A solver that serves any term gets the term's kernel when it runs. `kernel_argument` hands one over so
-that it is compiled in, as if it had been called by its name. The argument is an array whose one field is
-named after the kernel and the digest of its source. So numba's type of it names the kernel, and what numba
-keeps on disk is found again by another process.
+A solver that serves any term gets the term's kernel when it runs. `kernel_argument` hands one over as an
+array whose one field is named after the kernel and the digest of its source. So numba's type of it names
+the kernel, which is compiled in, and found on disk again by another process.
 """
 
 from __future__ import annotations

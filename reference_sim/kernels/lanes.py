@@ -1,12 +1,12 @@
-"""Layouts of kernels that work on several elements side by side, for loops that become vector instructions.
+"""Layouts of kernels that work on several elements side by side, by vector instructions.
 
-Float64: a kernel beside its definition copies corners and constants of LANES_FLOAT64 elements into one
-array u of known size, row after row, works them out in a loop of fixed length without a branch, and hands
-the results out one by one. Within one array the compiler knows that nothing overlaps.
+Float64: a kernel copies corners and constants of LANES_FLOAT64 elements into one array u of known size,
+row after row, works them out in a loop of fixed length without a branch, and hands the results out. Within
+one array the compiler knows that nothing overlaps.
 
 Float32: the state of early-stopped L-BFGS is u (3V,), the displacement [m] from a point x_0 that float64
 has; so round-off is that of a displacement of millimetres and not of a body metres away. Elements come in
-blocks of LANES_FLOAT32, the last one filled up with elements of no stiffness; arrays of a block lie one
+blocks of LANES, the last one filled up with elements of no stiffness; arrays of a block lie one
 quantity after the other.
 
 Rows: numba writes a short loop of known length out number by number, and what was stored in single
@@ -26,7 +26,7 @@ from llvmlite import ir
 from numba import types
 from numba.extending import intrinsic
 
-from reference_sim.kernels.fast_kernels import TRAINING_LANES as L
+from reference_sim.kernels.fast_kernels import LANES
 from reference_sim.kernels.kernel_cache import njit
 
 LANES_FLOAT64 = 8
@@ -121,8 +121,7 @@ def _add(elements, blocks, slots, corners, size, base, stride, data):
                             data[at + i] += blocks[n, size * a + i, size * b + j]
 
 
-LANES_FLOAT32 = 16
-SCRATCH = 24 * LANES_FLOAT32  # numbers that a kernel may use for its own
+SCRATCH = 24 * LANES  # numbers that a kernel may use for its own
 FAST = {"nnan", "nsz", "reassoc", "contract", "arcp"}
 TINY = np.float32(1e-30)
 HALF, ONE, TWO, THREE = np.float32(0.5), np.float32(1.0), np.float32(2.0), np.float32(3.0)
@@ -136,7 +135,7 @@ class Float32Lanes:
     gradient (3V,) [N]; u, gradient and scratch (SCRATCH,) are float32. freeze: function of x_0 (V, 3)
     [m], called once a step, that returns `data`. stiffness: compiled function ((*data, places), values),
     which adds a scalar stiffness [N/m] that differs from step to step to the preconditioner, for stencils
-    (S, k) at places (B, k k LANES_FLOAT32), -1 where nothing is stored.
+    (S, k) at places (B, k k LANES), -1 where nothing is stored.
     """
 
     gradient: Any
@@ -146,12 +145,12 @@ class Float32Lanes:
 
 
 def to_blocks(values: np.ndarray) -> np.ndarray:
-    """Lay numbers (N, k) of N elements out in blocks (B, k LANES_FLOAT32), filled up with zeros."""
+    """Lay numbers (N, k) of N elements out in blocks (B, k LANES), filled up with zeros."""
     count, width = values.shape
-    padded = np.zeros((-(-count // LANES_FLOAT32) * LANES_FLOAT32, width), values.dtype)
+    padded = np.zeros((-(-count // LANES) * LANES, width), values.dtype)
     padded[:count] = values
-    blocks = padded.reshape(-1, LANES_FLOAT32, width).transpose(0, 2, 1)
-    return np.ascontiguousarray(blocks).reshape(-1, width * LANES_FLOAT32)
+    blocks = padded.reshape(-1, LANES, width).transpose(0, 2, 1)
+    return np.ascontiguousarray(blocks).reshape(-1, width * LANES)
 
 
 def lay_out(stencils: np.ndarray, *constants: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -163,23 +162,22 @@ def lay_out(stencils: np.ndarray, *constants: np.ndarray) -> tuple[np.ndarray, n
 
 def empty_state(vertices: np.ndarray, quantities: int) -> np.ndarray:
     """Return room for so many float32 quantities of each element of these blocks."""
-    return np.zeros((len(vertices), quantities * LANES_FLOAT32), np.float32)
+    return np.zeros((len(vertices), quantities * LANES), np.float32)
 
 
 @njit(cache=True)
 def set_edges(x, vertices, columns, out):
     """Write the edges x_(k+1) - x_0 [m], k < columns, of elements at x (V, 3) into out, in blocks."""
     for b in range(len(vertices)):
-        for g in range(LANES_FLOAT32):
+        for g in range(LANES):
             first = vertices[b, g] // 3
             for k in range(columns):
-                other = vertices[b, (k + 1) * LANES_FLOAT32 + g] // 3
+                other = vertices[b, (k + 1) * LANES + g] // 3
                 for i in range(3):
-                    out[b, (3 * k + i) * LANES_FLOAT32 + g] = np.float32(x[other, i] - x[first, i])
+                    out[b, (3 * k + i) * LANES + g] = np.float32(x[other, i] - x[first, i])
 
 
 WIDE = ir.IntType(64)
-WIDTH = 16  # numbers of a row that `bits_at_most` compares
 _intrinsic: Any = intrinsic  # to a caller it has not the arguments of the function that types it
 
 
@@ -187,9 +185,9 @@ _intrinsic: Any = intrinsic  # to a caller it has not the arguments of the funct
 def copy_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
     """Copy row i of source to row j of target, flat arrays.
 
-    A row has TRAINING_LANES numbers of float32, or LANES_FLOAT64.
+    A row has LANES numbers of float32, or LANES_FLOAT64.
     """
-    lanes = LANES_FLOAT64 if source.dtype == types.float64 else L
+    lanes = LANES_FLOAT64 if source.dtype == types.float64 else LANES
 
     def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         source_row = _place(context, builder, signature.args[:2], args[:2], lanes, lanes)
@@ -205,8 +203,10 @@ def add_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
     """Add row i of source to row j of target, which may also be one of float64."""
 
     def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        numbers = builder.load(_place(context, builder, signature.args[:2], args[:2], L, L), align=4)
-        place = _place(context, builder, signature.args[2:], args[2:], L, L)
+        numbers = builder.load(
+            _place(context, builder, signature.args[:2], args[:2], LANES, LANES), align=4
+        )
+        place = _place(context, builder, signature.args[2:], args[2:], LANES, LANES)
         if signature.args[2].dtype == types.float64:
             numbers = builder.fpext(numbers, place.type.pointee)
         builder.store(builder.fadd(builder.load(place, align=4), numbers), place, align=4)
@@ -243,17 +243,17 @@ def mix_rows(_: Any, rows: Any, i: Any, j: Any, k: Any, u: Any, v: Any, w: Any) 
 def bits_at_most(_: Any, rows: Any, i: Any, limit: Any) -> Any:
     """Return an integer with a bit for each number of row i that is not above the limit.
 
-    rows: of WIDTH numbers in a flat float32 array.
+    rows: of LANES numbers in a flat float32 array.
     """
 
     def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        place = _place(context, builder, signature.args[:2], args[:2], WIDTH, WIDTH)
+        place = _place(context, builder, signature.args[:2], args[:2], LANES, LANES)
         numbers = builder.load(place, align=4)
         limits = ir.Constant(numbers.type, ir.Undefined)
-        for lane in range(WIDTH):
+        for lane in range(LANES):
             limits = builder.insert_element(limits, args[2], ir.IntType(32)(lane))
         within = builder.fcmp_unordered("<=", numbers, limits)
-        return builder.zext(builder.bitcast(within, ir.IntType(WIDTH)), WIDE)
+        return builder.zext(builder.bitcast(within, ir.IntType(LANES)), WIDE)
 
     return types.int64(rows, i, types.float32), build
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from reference_sim.cholesky import WIDTH, ScalarPattern, factorise, solve
+from reference_sim.cholesky import RIGHT_SIDES, ScalarPattern, factorise, solve
 from reference_sim.cloth import Cloth
 from reference_sim.energies import bend_hinge_kernels, contact_penalty, stretch_stvk_kernels
 from reference_sim.kernels.fast_kernels import StepTerms, step_terms
@@ -324,7 +324,7 @@ def _factor(cloth: Cloth, terms: StepTerms, lanes: list[Float32Lanes]) -> tuple[
     factor = Factor(
         constant, np.flatnonzero(free)[pattern.order], pattern.row_starts, pattern.row_columns,
         pattern.factor_rows, pattern.factor_columns, pattern.starts, pattern.rows, np.empty_like(constant),
-        np.empty(entries), np.empty(n), np.zeros(n), np.empty(n, np.int64), np.zeros((n, WIDTH)),
+        np.empty(entries), np.empty(n), np.zeros(n), np.empty(n, np.int64), np.zeros((n, RIGHT_SIDES)),
     )  # fmt: skip
     stiffening = []
     for k, term in changing:

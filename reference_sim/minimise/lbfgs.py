@@ -126,11 +126,10 @@ class LBFGS:
         return Stop("stalled", "no step along the quasi-Newton direction lowers the energy")
 
     def _run_in_float32(self, compiled: CompiledLBFGS, run: Descent) -> bool:
-        """Move `run` to where the compiled part ends; return whether Newton may go on from there.
+        """Run the float32 part; return whether Newton may go on from its end.
 
-        It may not if that is not below the start, if the start has no energy, or if nothing is left to it
-        though the tolerance is below the switch: the rounding of float32 would stay in an answer that is
-        meant to be nearer.
+        It may not if start or end is not finite, if the energy rose, or if the end is already within a
+        tolerance below the switch: the rounding of float32 would remain in the answer.
         """
         if not run.finite:
             return False

@@ -103,8 +103,8 @@ class StepMinimiser:
         if self._late:
             if callable(self.options["method"]):
                 raise ValueError(
-                    "simulate: Newton's method, not a function, ends steps that "
-                    f"{self._late[0].name!r} joins: choose method 'lbfgs' or 'newton', or leave the term out"
+                    f"simulate: method is a function, but Newton ends steps with {self._late[0].name!r}: "
+                    "choose 'lbfgs' or 'newton', or leave the term out"
                 )
             early = Potential([energy for energy in potential.energies if not energy.dynamic])
             self.opening_method = options.get("method", "lbfgs")

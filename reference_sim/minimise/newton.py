@@ -3,7 +3,7 @@
 Each iteration solves H p = -g and takes the full step. Where the Cholesky factorisation of H does not
 exist, a share of the elements' negative curvature is taken out, CONVEXITY at one projection level after
 another, and only when all of it was not enough (cloth without inertia) H is shifted by sigma M/dt^2.
-Taking all of it out always, as is common, needs several times the iterations once cloth wrinkles.
+Taking all of it out always needs several times the iterations once cloth wrinkles.
 
 The minimum of stiff cloth lies along a narrow, curved valley of the energy. A full step along it ends
 where stresses computed from the strain are false by orders of magnitude. So the Hessian takes the

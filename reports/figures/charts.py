@@ -25,7 +25,7 @@ from reports.figures.plotting import (
     power_text,
     style,
 )
-from reports.finished_run import Run, pick_seeds
+from reports.finished_run import Run, shown_frames
 from reports.statistics.means_and_spreads import value_of
 from reports.statistics.outcomes import leads
 from reports.statistics.pareto import (
@@ -93,17 +93,16 @@ def _family(run: Run, members: list[Point]) -> Curve:
     method = run.methods[members[0].method]
     if method.level is None:
         return Curve(members, style(run, method.name))
-    members.sort(key=lambda p: run.methods[p.method].level or 0.0)
-    levels = dict.fromkeys(
-        power_text(run.methods[p.method].level or 0.0) for p in (members[0], members[-1])
-    )
+    levels = {p.method: run.methods[p.method].level or 0.0 for p in members}
+    members.sort(key=lambda p: levels[p.method])
+    ends = dict.fromkeys(power_text(levels[p.method]) for p in (members[0], members[-1]))
     look = family_style(run, method)
-    return Curve(members, replace(look, label=f"{look.label}, {' to '.join(levels)}"))
+    return Curve(members, replace(look, label=f"{look.label}, {' to '.join(ends)}"))
 
 
 DECADES = 9  # below the largest error; what is smaller is named, not drawn
 GREY, FRONT, BAND = "#B4B4B4", "#DCDCDC", "#F0F0F0"
-MARKER, SMALL = 5.5, 3.5  # sizes of markers [points]
+MARKER, DOT = 5.5, 3.5  # sizes of markers [points]
 
 
 def draw_points(
@@ -130,7 +129,19 @@ def draw_points(
         for point in (*marks, *(p for p in curve.aside if p.error > floor)):
             colour = GREY if point.error < band else curve.look.colour
             pale = point in curve.aside
-            _draw_marker(axes, point, style(run, point.method).marker, colour, pale=pale)
+            width, height = point.time_spread / 2, point.error_spread
+            axes.errorbar(
+                point.time,
+                point.error,
+                xerr=[[min(width, 0.9 * point.time)], [width]],
+                yerr=[[min(height, 0.9 * point.error)], [height]],
+                color=colour,
+                marker=style(run, point.method).marker,
+                markersize=DOT if pale else MARKER,
+                elinewidth=0.8,
+                zorder=2.2 if pale else 3,
+                alpha=0.45 if pale else 1.0,
+            )
     if reference:
         axes.axvline(reference, color="black", linestyle=":", linewidth=1.0)
     axes.margins(0.08)
@@ -147,22 +158,6 @@ def _floor(points: Sequence[Point], band: float) -> float:
     """Return the error below which none is drawn: what is within the reference's needs no decades."""
     largest = max((p.error for p in points), default=0.0)
     return max(largest * 10.0**-DECADES, band / 10.0)
-
-
-def _draw_marker(axes: Axes, point: Point, marker: str, colour: str, *, pale: bool) -> None:
-    """Draw a point with its spreads."""
-    axes.errorbar(
-        point.time,
-        point.error,
-        xerr=[[min(point.time_spread / 2, 0.9 * point.time)], [point.time_spread / 2]],
-        yerr=[[min(point.error_spread, 0.9 * point.error)], [point.error_spread]],
-        color=colour,
-        marker=marker,
-        markersize=SMALL if pale else MARKER,
-        elinewidth=0.8,
-        zorder=2.2 if pale else 3,
-        alpha=0.45 if pale else 1.0,
-    )
 
 
 def error_of_page_one(run: Run) -> Drawing | None:
@@ -236,7 +231,7 @@ def excess_by_motion(run: Run) -> Drawing | None:
     axes.grid(True, axis="x", color=GRID, linewidth=0.6)
     for place, (key, median) in enumerate(medians[:count].items()):
         values, colour = excesses[key], style(run, key[1]).colour
-        axes.plot(values, [place] * len(values), "o", color=colour, markersize=SMALL, alpha=0.6, mew=0.0)
+        axes.plot(values, [place] * len(values), "o", color=colour, markersize=DOT, alpha=0.6, mew=0.0)
         axes.plot(median, place, "|", color="black", markersize=9.0)
     axes.set_yticks(range(count), labels[:count])
     axes.invert_yaxis()
@@ -247,17 +242,21 @@ def excess_by_motion(run: Run) -> Drawing | None:
 
 TERMS = ("strain", "bending", "inertia")
 # Least share of the largest energy that is shown: frames at rest would squeeze the rest.
-LEAST = 1e-4
+SHARE = 1e-4
 
 
 def energy_series(run: Run) -> Drawing | None:
     """Draw a panel for each term of one whole motion, a curve per method (the paper's figure 4)."""
-    scene, frames = _frames(run)
-    terms = [term for term in TERMS if term in frames and frames[term].notna().any()]
-    if not terms:
+    frames = shown_frames(run, run.frame)
+    if frames.empty:
         return None
+    scene = str(frames["scene"].iloc[0])
+    frames = frames[frames["scene"] == scene]
+    terms = [term for term in TERMS if term in frames and frames[term].notna().any()]
     have = set(frames.dropna(subset=terms, how="all")["method"])
     methods = leads(run, run.frame[run.frame["method"].isin(have)])
+    if not terms or not methods:
+        return None
     curves = {method: frames[frames["method"] == method] for method in methods}
     figure, panels = new_panels(len(terms))
     for axes, term in zip(panels, terms):
@@ -267,22 +266,10 @@ def energy_series(run: Run) -> Drawing | None:
         energies = np.concatenate([curve[term] for curve in curves.values()])
         energies = energies[np.isfinite(energies) & (energies > 0.0)]
         if len(energies):
-            axes.set_ylim(max(energies.min() / 1.5, energies.max() * LEAST), 1.6 * energies.max())
+            axes.set_ylim(max(energies.min() / 1.5, energies.max() * SHARE), 1.6 * energies.max())
             log_axis(axes, "y")
         axes.set(title=term.capitalize(), xlabel="time [s]")
     panels[0].set_ylabel("energy [J]")
     fit(figure, [style(run, method) for method in methods])
     caption = f"{name_scene(scene)}: energy of each frame by term. A frame without energy is a gap."
     return Drawing(figure, f"energy_series_{file_name(scene)}", caption)
-
-
-def _frames(run: Run) -> tuple[str, pd.DataFrame]:
-    """Return the first motion of frame_energies.csv with rows, its lines of the seed shown of each method."""
-    frames = run.frame_energies
-    if len(frames):
-        frames = frames[frames["scene"].isin(set(run.frame["scene"]))]
-    if frames.empty:
-        return "", frames
-    scene = str(frames["scene"].iloc[0])
-    seeds = pick_seeds(run.frame[run.frame["scene"] == scene]).loc[scene]
-    return scene, frames[(frames["scene"] == scene) & (frames["seed"] == frames["method"].map(seeds))]

@@ -175,8 +175,10 @@ function makeErrors() {
       + (panel.band ? ' Shaded: as near as equally valid simulations are to each other.' : '')
     : '';
   const can = (method) => method in content.scenes[state.scene].methods;
+  const positive = panel?.points.some((point) => point[2] > 0);
   byId('errors').replaceChildren(
-    panel ? errorPlot(panel, plot, content.methods, state.methods, can, togglePoint) : 'Nothing was timed in this scene.',
+    positive ? errorPlot(panel, plot, content.methods, state.methods, can, togglePoint)
+      : panel ? 'No error above 0.' : 'Nothing was timed in this scene.',
   );
 }
 
@@ -237,7 +239,7 @@ function seek(frame) {
 }
 
 function onKey(event) {
-  const pressed = event.target.closest('select, button, summary, input:not([type=range]), [role=button]');
+  const pressed = event.target.closest('select, button, input:not([type=range]), [role=button]');
   const moved = event.target.closest('select, input[type=range], [role=region]');
   if ((event.key === ' ' ? pressed : moved) || event.ctrlKey || event.altKey || event.metaKey) return;
   const steps = { ArrowLeft: -1, ArrowRight: 1, Home: -1e9, End: 1e9 };
@@ -286,7 +288,7 @@ function listen() {
       view?.draw();
     });
   }
-  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => chooseScene(state.scene));
+  matchMedia('(prefers-color-scheme: dark)').addEventListener('change', () => chooseScene(state.scene, state.frame));
   redraw();
 }
 

@@ -88,10 +88,10 @@ function inkOf(method) {
 function curvesPlot(series, unit, seek) {
   const finite = series.flatMap((one) => [...one.values].filter(Number.isFinite));
   const low = Math.min(0, ...finite);
-  const high = Math.max(...finite, low + 1e-9);
+  const high = Math.max(...finite, low + 1e-9 + 1e-6 * Math.abs(low));
   const end = Math.max(...series.map((one) => one.times[one.times.length - 1]), 1e-3);
   const x = axis(0, end, EDGE.left, WIDE - EDGE.right, false);
-  const y = axis(low, high * 1.04, HIGH - EDGE.bottom, EDGE.top, false);
+  const y = axis(low, high + 0.04 * (high - low), HIGH - EDGE.bottom, EDGE.top, false);
   const root = frameOf(x, y, 'time [s]', `Curves over time [${unit}]`);
   for (const one of series) {
     let path = '';

@@ -1,29 +1,31 @@
 // What a reader takes along: the address of what is shown, a table as text, a picture of the panes.
 
-const ESCAPED = { markdown: /[|\\]/g, latex: /[&%$#_{}]/g };
+const NO_FORMULA = /^(?![=@+-])|^-$|^[+-]?[0-9.]+(e[+-]?[0-9]+)?$/;
 
-// Heads and lines of a table, as plain text.
-function tableCells(table) {
+// Heads and lines of a table as texts, numbers as they are printed or exact; infinity is written as 1e300.
+function tableCells(table, exact) {
   const heads = table.columns.map((column) => (column.unit ? `${column.title} [${column.unit}]` : column.title));
-  const text = (cell) => (Array.isArray(cell) ? cell[0] : cell).trim();
+  const text = (cell) => {
+    const [shown, value] = Array.isArray(cell) ? cell : [cell, null];
+    return exact && value !== null && Math.abs(value) < 1e300 ? String(value) : shown.trim();
+  };
   return [heads, ...table.rows.map((row) => row.map(text))];
 }
 
 const FORMATS = {
-  csv: (lines) => lines.map((line) => line.map((cell) => (/[",\n]/.test(cell) ? `"${cell.replaceAll('"', '""')}"` : cell)).join(',')).join('\n'),
-  markdown: (lines) => {
-    const row = (line) => `| ${line.map((cell) => cell.replace(ESCAPED.markdown, '\\$&')).join(' | ')} |`;
-    return [row(lines[0]), row(lines[0].map(() => '---')), ...lines.slice(1).map(row)].join('\n');
+  csv: (lines) => {
+    const safe = (cell) => (NO_FORMULA.test(cell) ? cell : `'${cell}`);
+    const quoted = (cell) => (/[",\n]/.test(cell) ? `"${cell.replaceAll('"', '""')}"` : cell);
+    return lines.map((line) => line.map((cell) => quoted(safe(cell))).join(',')).join('\n');
   },
-  latex: (lines, table) => {
-    const row = (line) => `${line.map((cell) => cell.replace(ESCAPED.latex, '\\$&')).join(' & ')} \\\\`;
-    const sides = table.columns.map((column) => (column.words ? 'l' : 'r')).join('');
-    return [`\\begin{tabular}{${sides}}`, '\\toprule', row(lines[0]), '\\midrule', ...lines.slice(1).map(row), '\\bottomrule', '\\end{tabular}'].join('\n');
+  markdown: (lines) => {
+    const row = (line) => `| ${line.map((cell) => cell.replace(/[|\\]/g, '\\$&')).join(' | ')} |`;
+    return [row(lines[0]), row(lines[0].map(() => '---')), ...lines.slice(1).map(row)].join('\n');
   },
 };
 
 function tableText(table, format) {
-  return FORMATS[format](tableCells(table), table);
+  return FORMATS[format](tableCells(table, format === 'csv'));
 }
 
 // To the clipboard; where the browser gives none to a page from disk, by a selection.

@@ -34,7 +34,7 @@ def rescale(values: np.ndarray | float, scale: str) -> np.ndarray | float:
 
 
 def unscale(values: np.ndarray | float, scale: str) -> np.ndarray | float:
-    """Return what `rescale` makes these values of."""
+    """Invert `rescale`."""
     if scale == RATIO:
         with np.errstate(over="ignore"):  # a few seeds of what broke can leave the upper end open
             return np.exp(values)
@@ -116,7 +116,8 @@ class Effect:
     def p_value(self) -> float | None:
         """Return the two-sided p-value that the first is the second.
 
-        It is below LEVEL where the interval excludes it; None where nothing was repeated, and of costs.
+        None where nothing was repeated, and of costs. Below LEVEL where the interval excludes 0 and
+        `least_p` is below it.
         """
         from scipy import stats
 
@@ -179,6 +180,9 @@ def effect(one: Mean, other: Mean, scale: str = "", *, unit: float | None = None
     }
     changes = _changes(one, other, scale)
     spread = noise(changes)
+    if spread is None:  # as between two runs, whose noises are independent
+        noises = (_slope(mean, scale) * (mean.uncertainty or 0.0) for mean in (one, other))
+        spread = math.hypot(*noises)
     error, freedom = _bootstrap(grids) if any(repeated.values()) else (None, math.inf)
     return Effect(
         value=float(first.mean() - second.mean()),
@@ -188,7 +192,7 @@ def effect(one: Mean, other: Mean, scale: str = "", *, unit: float | None = None
         freedom=freedom,
         covers=" and ".join(name for name, several in repeated.items() if several),
         motions=len(first),
-        uncertainty=_add_noises(one, other, scale) if spread is None else spread,
+        uncertainty=spread,
         against=trend(changes),
         unit=max(abs(one.value), abs(other.value)) if unit is None else unit,
         complete=one.complete and other.complete,
@@ -242,11 +246,6 @@ def _changes(one: Mean, other: Mean, scale: str) -> dict[str, float]:
     if 2 * len(shared) <= len(scenes):
         return {}
     return {n: _change_of(one, n, scale, shared) - _change_of(other, n, scale, shared) for n in members}
-
-
-def _add_noises(one: Mean, other: Mean, scale: str) -> float:
-    """Return the noise where single changes are unknown, as between two runs: both add up as independent."""
-    return math.hypot(*(_slope(mean, scale) * (mean.uncertainty or 0.0) for mean in (one, other)))
 
 
 def _slope(mean: Mean, scale: str) -> float:

@@ -28,12 +28,11 @@ class Mean:
     """Mean of a metric, its spread over seeds, and the cells it was taken over.
 
     seeds: how many have the metric. full_count: number of cells that should have it, every seed in every
-    scene in which any method has the metric; where fewer have, the mean is not `complete` and the table
-    must say so. stalled: a solver left some frames of some cell unconverged. seeded: another seed would
-    give another value. cells: value of each (scene, seed). pairing_group: means of one group are compared
-    seed by seed; empty for none. uncertainty: in the metric's unit, how far an equally valid reference
-    would move the mean; None if unknown. moved: change of a cell's value by each of those references,
-    where it is known.
+    scene in which any method has the metric; where fewer have, the mean is not `complete`. stalled: a
+    solver left some frames of some cell unconverged. seeded: another seed would give another value.
+    cells: value of each (scene, seed). pairing_group: means of one group are compared seed by seed; empty
+    for none. uncertainty: how far an equally valid reference would move the mean, in the metric's unit;
+    None if unknown. moved: change of a cell's value by each of those references, where it is known.
     """
 
     value: float
@@ -210,9 +209,8 @@ def error_of_twin(rows: pd.DataFrame, metric: str) -> pd.Series:
     """Return scene -> error against the reference of its twin from another start, where that converged."""
     errors = rows[(rows["metric"] == metric) & rows["usable"] & (rows["status"] == "ok")]
     twin = errors[errors["method"] == SECOND_STARTS[0]]
-    return (
-        (twin["value"] - AT_REFERENCE.get(metric, 0.0)).abs().groupby(twin["scene"], observed=True).mean()
-    )
+    distances = (twin["value"] - AT_REFERENCE.get(metric, 0.0)).abs()
+    return distances.groupby(twin["scene"], observed=True).mean()
 
 
 def count_spreads(run: Run, rows: pd.DataFrame, method: str, metric: str) -> float | None:
@@ -231,7 +229,6 @@ def count_spreads(run: Run, rows: pd.DataFrame, method: str, metric: str) -> flo
     return float(error[scenes].sum()) / total if total > 0.0 else None
 
 
-HALF = 50.0  # [%]
 FRAME = ["scene", "seed", "seconds"]
 
 
@@ -239,11 +236,6 @@ def share_of_frames(term: str) -> Metric:
     """Declare the metric of the rows that `add_shares` adds."""
     title = f"Frames with more {term}"
     return Metric(name=f"frames/{term}", unit="%", title=title, definition="", lower_is_better=True)
-
-
-def half_of(mean: Mean) -> Mean:
-    """Return the mean that a share of frames is compared with: half of the frames of each roll-out."""
-    return replace(mean, value=HALF, cells=dict.fromkeys(mean.cells, HALF), seeded=False)
 
 
 def add_shares(rows: pd.DataFrame, frames: pd.DataFrame, term: str, one: str, other: str) -> pd.DataFrame:
@@ -263,11 +255,10 @@ def add_shares(rows: pd.DataFrame, frames: pd.DataFrame, term: str, one: str, ot
     masks = {one: pairs[term] > pairs[f"{term}_other"], other: pairs[term] < pairs[f"{term}_other"]}
     parts = [rows]
     for method, mask in masks.items():
-        shares = (
-            (100.0 * mask).groupby([pairs["scene"], pairs["seed"]]).mean().rename("share").reset_index()
-        )
+        cells = (100.0 * mask).groupby([pairs["scene"], pairs["seed"]])
+        shares = cells.mean().rename("share")
         terms = rows[(rows["method"] == method) & (rows["metric"] == f"energy/{term}") & rows["usable"]]
-        shared = terms.merge(shares, on=["scene", "seed"])
+        shared = terms.merge(shares.reset_index())
         metric = share_of_frames(term)
         shared = shared.assign(
             metric=metric.name, unit=metric.unit, value=shared["share"], uncertainty=float("nan"),

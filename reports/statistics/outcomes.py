@@ -66,9 +66,8 @@ MOST_EXTERNAL = 3  # of these that page one shows
 def leads(run: Run, rows: pd.DataFrame) -> list[str]:
     """Choose the methods of page one that these rows have.
 
-    They are the reference, SNUG (or SNUG by another recipe, or another network), roll-outs of the user,
-    the paper's rival or another network, and a baseline. Ablations count as networks where a run has no
-    others.
+    They are the reference, SNUG (else SNUG by another recipe, else another network), roll-outs of the
+    user, the paper's rival or another network, and a baseline. Without networks, ablations count as such.
     """
     have = set(rows[rows["usable"]]["method"])
     learned = [name for name in run.with_role(*LEARNED) if name in have]

@@ -17,14 +17,7 @@ from benchmarks.results.protocol import LEAST_MOTIONS
 from benchmarks.results.row import BEFORE_FRAMES
 from reports.finished_run import Run
 from reports.statistics.effects import DIFFERENCE, RATIO, Effect, effect
-from reports.statistics.means_and_spreads import (
-    HALF,
-    add_shares,
-    half_of,
-    pair,
-    recording_of,
-    share_of_frames,
-)
+from reports.statistics.means_and_spreads import add_shares, pair, recording_of, share_of_frames
 from reports.statistics.verdicts import (
     LESS,
     MORE,
@@ -38,6 +31,7 @@ from reports.statistics.verdicts import (
     holm,
 )
 
+HALF = 50.0  # [%]
 HOLDS, FAILS = "holds", "does not hold"  # or TIED, or OPEN
 # The sum of BEFORE_FRAMES.
 BEFORE = Metric(
@@ -226,20 +220,18 @@ def judge_claims(run: Run) -> list[Judged]:
     methods = set(frame["method"])
     claims = [claim for claim in CLAIMS if {claim.lower, claim.higher} <= methods]
     compared = [_compare(run, frame, claim) for claim in claims]
-    p_values = [
-        comparison.effect.p_value() if comparison.effect else None
-        for claim, comparison in zip(claims, compared)
-    ]
+    p_values = [line.effect.p_value() if line.effect else None for line in compared]
     tested = [claim for claim in PRIMARY if claim.tested]
     tests = {k: p for k, p in enumerate(p_values) if claims[k] in tested and p is not None}
     for k, corrected in zip(tests, holm([*tests.values()], family=len(tested))):
         p_values[k] = corrected
     lines = []
     for claim, comparison, p in zip(claims, compared, p_values):
-        if comparison.effect is not None and comparison.one is not None and comparison.other is not None:
-            outcome = verdict(claim, comparison.effect, p)
-            remark = explain(comparison.effect) if outcome == OPEN else ""
-            remark += comparison.one.fewer or comparison.other.fewer
+        one, other, size = comparison.one, comparison.other, comparison.effect
+        if one and other and size:
+            outcome = decide_claim(claim, size, p)
+            remark = explain(size) if outcome == OPEN else ""
+            remark += one.fewer or other.fewer
         else:
             outcome, remark = verdict_of_failed(claim, comparison, frame)
         if outcome:
@@ -252,11 +244,12 @@ def _compare(run: Run, frame: pd.DataFrame, claim: Claim) -> Comparison:
     if claim.of_frames:  # the other's share is what is left, and no second sample
         metric = share_of_frames(claim.of_frames)
         rows = add_shares(frame, run.frame_energies, claim.of_frames, claim.lower, claim.higher)
-        rows = rows[(rows["metric"] == metric.name) | ~rows["usable"]]
         one, other = pair(rows, claim.lower, claim.higher, metric.name)
         if one is None or other is None:
             return Comparison(metric, one, other, None)
-        surplus = effect(one, half_of(one), DIFFERENCE)
+        cells = dict.fromkeys(one.cells, HALF)
+        half = replace(one, value=HALF, cells=cells, seeded=False)
+        surplus = effect(one, half, DIFFERENCE)
         # Shares lie between 0 and 100 %: of motions that agree Student's t makes more than the sign test
         # can.
         surplus = replace(surplus, possible=(-HALF, HALF), least_p=min(1.0, 2.0 * 0.5**surplus.motions))
@@ -268,7 +261,7 @@ def _compare(run: Run, frame: pd.DataFrame, claim: Claim) -> Comparison:
     return compare_methods(run, frame, metric, claim.lower, claim.higher)
 
 
-def verdict(claim: Claim, effect: Effect, p: float | None) -> str:
+def decide_claim(claim: Claim, effect: Effect, p: float | None) -> str:
     """Return how the claim came out, by the p-value as the claim's family corrects it.
 
     A claim of parity holds where the upper end of the interval is within the margin of equality, also
@@ -299,9 +292,8 @@ def verdict_of_failed(claim: Claim, compared: Comparison, frame: pd.DataFrame) -
     answer = compared.metric.lower_is_better and compared.metric.of == "answer"
     if not answer or finished is None or failed.empty or failed["usable"].any():
         return "", ""
-    motions = {recording_of(scene) for scene, _ in finished.cells} & set(
-        map(recording_of, failed["scene"])
-    )
+    motions = {recording_of(scene) for scene, _ in finished.cells}
+    motions &= set(map(recording_of, failed["scene"]))
     if set(failed["status"]) != {"diverged"}:
         return OPEN, f": no roll-out of the {side} finished"
     if len(motions) < LEAST_MOTIONS:

@@ -12,13 +12,10 @@ from reports.statistics.means_and_spreads import error_of_twin, mean_of, means
 
 TIME, REPEATS = "cost/frame", "cost/spread"
 WHOLE = "cost/whole"  # from pose to world vertices; TIME is a method's own work
-# Of the method's own step first: no chaos blurs them. Then those of the roll-out against the
-# simulation's.
+# First those of a method's own step, which no chaos blurs; then of its roll-out.
 ERRORS = (
     "gap/energy", "step/curvature", "step/distance", "curvature/histogram", "distance/rms", "curvature/error",
 )  # fmt: skip
-# What the reference leaves where its planes are searched at its end.
-PLANES = {"gap/energy": "gap/refrozen"}
 SMALLER_STEPS = "simulation-dt"  # a family of another problem: its steps have another potential
 # Of the step's own potential, which another step size changes.
 OWN_STEP = ("gap/energy", "step/curvature", "step/distance")
@@ -28,8 +25,8 @@ OWN_STEP = ("gap/energy", "step/curvature", "step/distance")
 class Point:
     """Run time [ms per frame] and error of a method.
 
-    time_spread: largest less smallest repeat [ms], else two standard deviations over seeds. error_spread:
-    one standard deviation over seeds or, where that is more, the noise of the reference. Both 0 if unknown.
+    time_spread [ms]: the larger of two standard deviations over seeds and the range of repeats.
+    error_spread: the larger of one standard deviation and the reference's noise. Both 0 if unknown.
     """
 
     method: str
@@ -42,26 +39,25 @@ class Point:
 def points_of(run: Run, rows: pd.DataFrame, metric: str) -> list[Point]:
     """Return a point for each method that has both numbers in all the scenes and seeds.
 
-    rows: of the scenes over which means are taken, over seeds too that came through all of them. metric:
-    of the error.
+    rows: of the scenes averaged over; a seed counts only where it has both numbers in every scene. metric:
+    name of the error.
     """
     x = run_time(rows)
+    names = x, metric, TIME, REPEATS
     measured = rows[rows["usable"] & rows["metric"].isin([metric, x])].groupby(["method", "seed"]).size()
     full_pairs = measured.index[measured == 2 * rows["scene"].nunique()]
     in_all = rows.set_index(["method", "seed"]).index.isin(full_pairs)
     rows = rows.assign(usable=rows["usable"] & in_all)
-    rows = rows[rows["metric"].isin([metric, x, TIME, REPEATS]) | ~rows["usable"]]
+    rows = rows[rows["metric"].isin(names) | ~rows["usable"]]
     wide = means(rows, "method", "metric")
     points = []
     for method in run.order(rows["method"]):
-        time, error, inference, repeats = (
-            wide.get((method, name)) for name in (x, metric, TIME, REPEATS)
-        )
+        time, error, inference, repeats = (wide.get((method, name)) for name in names)
         if time is None or error is None:
             continue
         spread = 2.0 * (time.spread or 0.0)
         if repeats is not None and inference is not None:
-            spread = inference.value * repeats.value / 100.0
+            spread = max(spread, inference.value * repeats.value / 100.0)
         points.append(Point(method, time.value, error.value, spread, error.spread_or_uncertainty or 0.0))
     return points
 
@@ -87,12 +83,6 @@ def front(points: Iterable[Point]) -> list[Point]:
     return best
 
 
-def find_fastest(points: Iterable[Point], error: float) -> Point | None:
-    """Return the fastest point with at most that error, or None."""
-    reached = [p for p in points if p.error <= error]
-    return min(reached, key=lambda p: (p.time, p.error, p.method)) if reached else None
-
-
 def solvers(run: Run, points: Iterable[Point]) -> list[Point]:
     """Return the points of solvers without anything learned, of the reference's discrete problem."""
     names = set(run.with_role("reference", "solver", "reference-variant"))
@@ -105,10 +95,9 @@ def noise_floor(run: Run, rows: pd.DataFrame, metric: str) -> float:
     It is the error of the reference's twin from another start, the mean of scenes; of the energy gap what
     the reference leaves on planes searched at its end. 0 where none is known.
     """
-    if metric in PLANES:
-        gaps = rows[
-            rows["usable"] & (rows["metric"] == PLANES[metric]) & (rows["method"] == run.reference)
-        ]
+    if metric == "gap/energy":
+        gaps = rows[rows["usable"] & (rows["metric"] == "gap/refrozen")]
+        gaps = gaps[gaps["method"] == run.reference]
         of_scene = gaps.groupby("scene", observed=True)["value"].mean().abs()
     else:
         of_scene = error_of_twin(rows, metric)
@@ -148,14 +137,14 @@ def rivals(run: Run, timed: pd.DataFrame) -> list[str]:
     names = [run.reference] if mean_of(timed, run.reference, TIME) else []
     for metric in ACCURACIES:
         points = points_of(run, timed, metric)
-        network = next((p for p in points if p.method == NETWORK), None)
-        best = find_fastest(solvers(run, points), network.error) if network else None
-        names += [best.method] if best else []
+        if network := next((p for p in points if p.method == NETWORK), None):
+            best = front(solvers(run, points))
+            names += [p.method for p in best if p.error <= network.error][:1]
     return list(dict.fromkeys(names))
 
 
 def select_timed(run: Run, others: pd.DataFrame) -> tuple[pd.DataFrame, list[str]]:
-    """Return the rows of scenes of the first garment in which SNUG and solvers were timed.
+    """Return rows of scenes of the first garment in which SNUG and a method with a level were timed.
 
     Their names come second. Of suite speed where it has any: whole motions have no energy gap.
     others: rows where there are none.

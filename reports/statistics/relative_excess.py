@@ -12,7 +12,7 @@ that falls loses ever more energy: below -100 it has fallen off, and its roll-ou
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from operator import itemgetter
 
 import numpy as np
@@ -44,10 +44,8 @@ def relative_metric(metric: str) -> Metric:
         return RELATIVE_EXCESS
     term = metric.partition("/")[2]
     definition = f"{term} above the reference's as a share of skinning's excess of total energy"
-    return Metric(
-        name=f"relative_excess/{term}", unit="%", title=f"Relative excess of {term}", definition=definition,
-        lower_is_better=True,
-    )  # fmt: skip
+    name, title = f"relative_excess/{term}", f"Relative excess of {term}"
+    return replace(RELATIVE_EXCESS, name=name, title=title, definition=definition)
 
 
 def add_excess(
@@ -55,9 +53,8 @@ def add_excess(
 ) -> pd.DataFrame:
     """Return the rows, and a row of the relative excess of each usable row of the metric.
 
-    Scenes without the reference or skinning have none, nor those in which skinning has no excess. One is not
-    usable where that of the cell's total, or its own in a cell without a total, is below LEAST. Rows that
-    have relative excesses of the metric already come back as they are.
+    Scenes without reference, skinning or an excess of skinning have none. One is not usable where that of
+    the cell's total, or its own without a total, is below LEAST. Rows that have them come back as they are.
 
     Args:
         run: declares the reference and its family, of which members that stalled are left out.
@@ -85,12 +82,9 @@ def add_excess(
             # The reference is zero by definition, whichever simulation it is.
             moved = () if method == run.reference else tuple((k, v - value) for k, v in shares.items())
             share = 100.0 / (total[SKINNING] - total[run.reference])
-            energy_of_cell = cell_energies.get((scene, method, seed))
-            if energy_of_cell is None:
-                worn = value >= LEAST
-            else:
-                worn = share * (energy_of_cell - total[run.reference]) >= LEAST
-            parts.append((place, value, share * uncertainty, moved, worn))
+            whole = cell_energies.get((scene, method, seed))
+            of_whole = value if whole is None else share * (whole - total[run.reference])
+            parts.append((place, value, share * uncertainty, moved, of_whole >= LEAST))
     if not parts:
         return rows
     places, values, noises, moves, are_worn = map(list, zip(*parts))

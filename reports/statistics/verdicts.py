@@ -28,7 +28,6 @@ from reports.statistics.effects import DIFFERENCE, EXCESS, RANGE, Effect, cost_e
 from reports.statistics.means_and_spreads import Mean, pair
 from reports.statistics.relative_excess import pair_excesses, relative_metric
 
-SIGNED = {"dynamics/correlation": DIFFERENCE}  # on this scale though a run may have positive values alone
 TIED, OPEN, LESS, MORE = "tie", "inconclusive", "less", "more"  # how the first stands to the second
 
 
@@ -51,18 +50,15 @@ def compare_methods(run: Run, rows: pd.DataFrame, metric: Metric, one: str, othe
     Energies whose zero is a choice are compared by their relative excess, costs by their range.
     """
     if metric.arbitrary_zero:
-        means = pair_excesses(run, rows, one, other, metric.name)
+        first, second = pair_excesses(run, rows, one, other, metric.name)
     else:
-        means = pair(rows[(rows["metric"] == metric.name) | ~rows["usable"]], one, other, metric.name)
-    first, second = means
-    if first is None or second is None:
-        return Comparison(metric, first, second, None)
-    return Comparison(metric, first, second, effect_of(metric, first, second))
+        first, second = pair(rows, one, other, metric.name)
+    size = effect_of(metric, first, second) if first and second else None
+    return Comparison(metric, first, second, size)
 
 
-def measure_of(compared: Comparison) -> Metric:
-    """Return the metric of the means: relative excess where the compared metric's zero is a choice."""
-    metric = compared.metric
+def measure_of(metric: Metric) -> Metric:
+    """Return what is compared of a metric: relative excess where its zero is a choice."""
     return relative_metric(metric.name) if metric.arbitrary_zero else metric
 
 
@@ -70,7 +66,9 @@ def effect_of(metric: Metric, one: Mean, other: Mean) -> Effect:
     """Compute the effect between two means of a metric, on the metric's scale."""
     if metric.of != "answer":
         return cost_effect(one, other, exact=metric.of == "method")
-    return effect(one, other, EXCESS if metric.arbitrary_zero else SIGNED.get(metric.name, ""))
+    # A correlation may be negative, in other runs.
+    scale = DIFFERENCE if metric.name.endswith("correlation") else ""
+    return effect(one, other, EXCESS if metric.arbitrary_zero else scale)
 
 
 def decide(effect: Effect, p: float | None, factor: float = 1.0) -> str:

@@ -23,7 +23,7 @@ from reports.statistics.relative_excess import (
     own_excess_of,
 )
 from reports.statistics.verdicts import OPEN, decide, explain, measure_of
-from reports.tables.table import GARMENT, METHOD, SCENE, SUITE, Cell, Column, Table, name_scene, table
+from reports.tables.table import GARMENT, METHOD, SCENE, SUITE, Cells, Column, Table, name_scene, table
 
 # The rule of verdicts (reports.statistics.verdicts) in a note.
 VERDICTS = (
@@ -53,10 +53,11 @@ def findings(run: Run) -> list[Table]:
         Column("p", "p", digits=2),
         Column("verdict", "Here", text=True),
     )
-    rows: list[tuple[Cell, ...]] = [
+    rows: list[Cells] = [
         (
             line.claim.says, "primary" if line.claim.primary else "exploratory",
-            measure_of(line.compared).heading, line.claim.lower, line.claim.relation, line.claim.higher,
+            measure_of(line.compared.metric).heading,
+            line.claim.lower, line.claim.relation, line.claim.higher,
             line.compared.one, line.compared.other, line.compared.effect, line.p,
             line.verdict + line.remark,
         )
@@ -76,18 +77,17 @@ def relative_excess(run: Run) -> list[Table]:
     """Tabulate the relative excess of each method over the motions of a garment, and by time step."""
     zero = {*run.with_role("reference", "reference-variant"), SKINNING}
     excesses: dict[tuple[str, str], Excess] = {}
-    lines: list[tuple[Cell, ...]] = []
+    lines: list[Cells] = []
     for garment in run.garments(run.garment_rows):
         rows = add_excess(run, run.select_garment(garment))
         for method in run.order(set(rows[rows["usable"]]["method"]) - zero):
             if excess := excess_of(run, rows, method):
                 excesses[garment, method] = excess
                 lines.append((garment, method, own_excess_of(run, rows, method), *_cells_of(excess)))
+    shares = ("typical", "recorded", "others", "pooled", "worst")
     columns = (
         GARMENT, METHOD, Column("own", "In own energies", "%", digits=2),
-        Column("typical", "Typical", "%", digits=2), Column("recorded", "Recorded", "%", digits=2),
-        Column("others", "Others", "%", digits=2), Column("pooled", "Pooled", "%", digits=2),
-        Column("worst", "Worst", "%", digits=2),
+        *(Column(name, name.capitalize(), "%", digits=2) for name in shares),
         Column("worst_motion", "Worst motion", text=True),
         Column("motions", "Motions"), Column("verdict", "Energy against the reference", text=True),
     )  # fmt: skip
@@ -102,7 +102,7 @@ def relative_excess(run: Run) -> list[Table]:
 def _tabulate_steps(run: Run, excesses: Mapping[tuple[str, str], Excess]) -> list[Table]:
     """Tabulate typical relative excesses by garment and method against each smaller time step."""
     members = [name for name in run.reference_family if name not in STARTS[1]]
-    lines: list[tuple[Cell, ...]] = []
+    lines: list[Cells] = []
     for key, excess in excesses.items():
         value, against = excess.effect.value, excess.effect.against
         moved = {name: float(unscale(value + change, EXCESS)) for name, change in against.items()}
@@ -119,7 +119,7 @@ def _tabulate_steps(run: Run, excesses: Mapping[tuple[str, str], Excess]) -> lis
     return table("excess_by_time_step", columns, lines, caption, grouped_by=("garment",))
 
 
-def _cells_of(excess: Excess) -> tuple[Cell, ...]:
+def _cells_of(excess: Excess) -> Cells:
     """Return the cells of a method in table relative_excess."""
     scene, value = excess.worst
     verdict = decide(excess.effect, excess.effect.p_value())
@@ -140,7 +140,7 @@ def errors_in_spreads(run: Run) -> list[Table]:
     """Tabulate distances, curvature and dynamics in errors of the reference's other start."""
     metrics = [run.metrics[name] for name in AT_REFERENCE if name in run.metrics]
     variants = set(run.with_role("reference", "reference-variant"))
-    lines: list[tuple[Cell, ...]] = []
+    lines: list[Cells] = []
     for garment in run.garments(run.garment_rows):
         rows = run.select_garment(garment)
         for method in run.order(set(rows[rows["usable"]]["method"]) - variants):
@@ -219,6 +219,5 @@ def list_unfinished(run: Run) -> list[Table]:
         Column("seed", "Seed", text=True), Column("status", "Status", text=True),
         Column("reason", "Reason", text=True))  # fmt: skip
     cells = [(*line[:5], line[5] or "no reason given") for line in lines]
-    return table(
-        "unfinished", columns, cells, "Cells that failed or were skipped, with the reason of each."
-    )
+    caption = "Cells that failed or were skipped, with the reason of each."
+    return table("unfinished", columns, cells, caption)

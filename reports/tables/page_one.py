@@ -9,7 +9,7 @@ from reports.statistics.means_and_spreads import mean_of
 from reports.statistics.outcomes import EXTERNAL, leads
 from reports.statistics.pareto import rivals, run_time, select_timed
 from reports.statistics.relative_excess import SKINNING, add_excess, excess_of, own_excess_of
-from reports.tables.table import METHOD, Cell, Column, Table, metric_column, say_where, table
+from reports.tables.table import METHOD, Cell, Cells, Column, Table, metric_column, say_where, table
 
 ROWS = 8
 ANSWERS = ("penetration/surface", "dynamics/correlation", "dynamics/amplitude")
@@ -48,7 +48,7 @@ def overview(run: Run, methods: Sequence[str] = ()) -> list[Table]:
         m: (own_excess.get(m, share.effect), share.effect) for m, share in excesses.items() if share
     }
     shares |= {run.reference: (0.0, 0.0)} if shares else {}
-    lines: list[tuple[Cell, ...]] = [
+    lines: list[Cells] = [
         (
             method, *shares.get(method, (None, None)),
             *(mean_of(rows, method, metric.name) for metric, rows in sources),

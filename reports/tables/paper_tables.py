@@ -13,7 +13,7 @@ import pandas as pd
 
 from reports.finished_run import Run
 from reports.statistics.means_and_spreads import match_scenes, recording_of
-from reports.tables.table import Cell, Column, Table, join, table
+from reports.tables.table import Cells, Column, Table, join, table
 
 TEST_CLIPS = ("01_01", "07_02", "104_54", "55_27")
 # Energy -> of PBNS and of SNUG [J].
@@ -62,7 +62,7 @@ def _mean(means: pd.Series, method: str, metric: str, frames: pd.Series) -> floa
 
 def _energies(run: Run, means: pd.Series, name: str, pbns: str, snug: str) -> list[Table]:
     """Tabulate energies. Gravity has no ratio: its zero is a choice, and the paper does not state its own."""
-    lines: list[tuple[Cell, ...]] = []
+    lines: list[Cells] = []
     for motions, frames in _samples(run, (pbns, snug), "energy/strain").items():
         for term, printed in TABLE_1.items():
             ours = [_mean(means, method, f"energy/{term}", frames) for method in (pbns, snug)]
@@ -94,7 +94,7 @@ def _curvature(run: Run, means: pd.Series, name: str, base: str) -> list[Table]:
     variants = {term: method for term, method in named.items() if method in {base, *run.methods}}
     if len(variants) == 1:
         return []
-    lines: list[tuple[Cell, ...]] = []
+    lines: list[Cells] = []
     for motions, frames in _samples(run, tuple(variants.values()), CURVATURE[0]).items():
         values = {
             method: [_mean(means, method, metric, frames) for metric in CURVATURE]

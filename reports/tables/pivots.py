@@ -8,9 +8,9 @@ from benchmarks.metric import Metric
 from benchmarks.results.protocol import SECOND_STARTS
 from reports.finished_run import Run
 from reports.statistics.means_and_spreads import means
-from reports.statistics.relative_excess import SKINNING, TOTAL, excess_of, relative_metric
-from reports.statistics.verdicts import compare_methods
-from reports.tables.table import GARMENT, METHOD, SCENE, SUITE, Cell, Column, Table, metric_column, table
+from reports.statistics.relative_excess import SKINNING, TOTAL, excess_of
+from reports.statistics.verdicts import compare_methods, measure_of
+from reports.tables.table import GARMENT, METHOD, SCENE, SUITE, Cells, Column, Table, metric_column, table
 
 
 def metric_tables(run: Run) -> list[Table]:
@@ -60,7 +60,7 @@ def _average_seeds(run: Run, name: str) -> list[Table]:
 
 def pivot(
     run: Run, frame: pd.DataFrame, name: str, keys: tuple[str, ...]
-) -> tuple[list[Metric], list[tuple[Cell, ...]]]:
+) -> tuple[list[Metric], list[Cells]]:
     """Compute means of the frame, a line for each value of the keys, a column for each metric.
 
     frame: rows of the run; those that failed say what a mean lacks. name: of the table that the metrics
@@ -79,7 +79,7 @@ def pivot(
     outer = {key[:-1]: k for k, key in reversed(list(enumerate(wide.index)))}
     last = len(keys) - 1
 
-    def order(line: tuple[Cell, ...]) -> tuple[int, int, int]:
+    def order(line: Cells) -> tuple[int, int, int]:
         """Garments as declared, other outer keys as they come, methods in their order."""
         garment = garments[str(line[0])] if keys[0] == "garment" else 0
         return garment, outer[line[:last]], methods[str(line[last])]
@@ -96,7 +96,7 @@ COMPARED = ("energy/total", "curvature/histogram", "penetration/vertices", "roll
 def ablation_effects(run: Run) -> list[Table]:
     """Tabulate the effect of each ablation against its base, with intervals."""
     metrics = [run.metrics[name] for name in COMPARED if name in run.metrics]
-    lines: list[tuple[Cell, ...]] = []
+    lines: list[Cells] = []
     for garment in run.garments(run.garment_rows):
         rows = run.select_garment(garment)
         for method in run.order(run.find_ablations(rows) & set(rows[rows["usable"]]["method"])):
@@ -109,7 +109,7 @@ def ablation_effects(run: Run) -> list[Table]:
         "excess, in points."
     )
     note = "Below: 95 % intervals over motions and seeds; of points with the mean nearer to 0 held."
-    heads = [relative_metric(metric.name) if metric.arbitrary_zero else metric for metric in metrics]
+    heads = [measure_of(metric) for metric in metrics]
     columns = (GARMENT, METHOD, *map(metric_column, heads))
     return table("ablation_effects", columns, lines, caption, grouped_by=("garment",), note=note)
 
@@ -129,7 +129,7 @@ def shapes(run: Run) -> list[Table]:
     if norms.nunique() < 2 or not metrics:
         return []
     methods = run.order(set(rows["method"]) - run.twins)
-    lines: list[tuple[Cell, ...]] = []
+    lines: list[Cells] = []
     for name, bodies in ((OTHERS, norms > 0.0), (MEAN_BODY, norms == 0.0)):
         if not bodies.any():
             continue

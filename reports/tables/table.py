@@ -24,7 +24,7 @@ _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
 def number(value: float | None, digits: int = 3, *, trim: bool = False) -> str:
-    """Return `value` to `digits` significant digits; a dash if absent or not finite.
+    """Return `value` to `digits` significant digits, at least to the unit; a dash if absent or not finite.
 
     `trim` leaves out zeros at the end, for numbers that are exact.
 
@@ -111,6 +111,7 @@ def join(items: Sequence[str]) -> str:
 ROUNDING = {"dynamics/amplitude": 1e-4}  # a network's float32 positions alone move a hem by 1e-6 to 1e-5
 EFFECT_PARTS = ("kind", "low", "high", "covers")
 Cell = float | int | str | Mean | Effect | None
+Cells = tuple[Cell, ...]  # of a row
 
 
 @dataclass(frozen=True)
@@ -152,7 +153,7 @@ class Table:
 
     name: str
     columns: tuple[Column, ...]
-    rows: tuple[tuple[Cell, ...], ...]
+    rows: tuple[Cells, ...]
     caption: str = ""
     grouped_by: tuple[str, ...] = ()
     note: str = ""
@@ -198,7 +199,7 @@ def metric_column(metric: Metric) -> Column:
 def table(
     name: str,
     columns: Sequence[Column],
-    rows: Sequence[tuple[Cell, ...]],
+    rows: Sequence[Cells],
     caption: str = "",
     **fields: Any,
 ) -> list[Table]:

@@ -1,7 +1,7 @@
 """A table for a paper, as CSV and as LaTeX: what reviewers of learned garments ask for.
 
-Numbers are those of page one: means over independent sources of motion, of a source over its segments, and
-over seeds, of times over the scenes in which solvers were timed.
+Means as on page one, but over scenes in which a method has all of its seeds: over independent sources of
+motion, of a source over its segments, and seeds; of times over scenes with timed solvers.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from reports.statistics.means_and_spreads import pair, recording_of
 from reports.statistics.pareto import run_time, select_timed
 from reports.statistics.relative_excess import TOTAL, add_excess, excess_of, own_excess_of
 from reports.statistics.verdicts import effect_of
-from reports.tables.table import DASH, METHOD, REMARKS, Cell, Column, Table, column_texts, metric_column
+from reports.tables.table import DASH, METHOD, REMARKS, Cells, Column, Table, column_texts, metric_column
 
 NAME = "for_your_paper"
 METRICS = (
@@ -44,7 +44,7 @@ def write_paper_table(folder: RunFolder, run: Run) -> Table:
     return table
 
 
-def _name_lacking(table: Table, row: tuple[Cell, ...]) -> str:
+def _name_lacking(table: Table, row: Cells) -> str:
     """Return the columns in which a row's mean is over fewer scenes or seeds than it should be."""
     cells = zip(table.columns, row)
     return ", ".join(c.name for c, cell in cells if isinstance(cell, Effect) and not cell.complete)
@@ -60,7 +60,7 @@ def paper_table(run: Run) -> Table:
     timed, _ = select_timed(run, rows)
     queries = [(name, rows) for name in METRICS] + [(run_time(timed), timed)]
     sources = [(run.metrics[n], part) for n, part in queries if n in set(part[part["usable"]]["metric"])]
-    lines: list[tuple[Cell, ...]] = []
+    lines: list[Cells] = []
     for method in run.order(usable["method"]):
         of_method = usable[(usable["method"] == method) & usable["metric"].isin((TOTAL, *METRICS))]
         common = excess_of(run, excesses, method) if method != run.reference else None

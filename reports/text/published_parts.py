@@ -31,7 +31,7 @@ from benchmarks.metrics import list_metrics
 from benchmarks.presets import PRESETS
 from benchmarks.results.run_folder import RunFolder
 from reports.finished_run import Run
-from reports.sentences import verdict
+from reports.sentences import ALIKE, verdict
 from reports.statistics.effects import RATIO
 from reports.statistics.means_and_spreads import mean_of
 from reports.statistics.outcomes import PUBLISHED, read_published
@@ -49,7 +49,7 @@ TIMED = ("quick", "other_networks")  # judge claims on times: nothing ran beside
 TIMES = ("s", "ms")  # units
 FAMILIES = {"primary": PRIMARY, "exploratory": EXPLORATORY}
 SOLVER = "fast-lbfgs-10"  # stopped early, on the front page
-SWING, ALIKE = "dynamics/amplitude", "dynamics/correlation"
+SWING = "dynamics/amplitude"
 Rows = Sequence[Sequence[str]]
 
 
@@ -57,8 +57,9 @@ def published_part(request: str) -> str:
     """Return the Markdown of a generated part.
 
     Raises:
-        ValueError: words of no known form.
+        ValueError: words of no known form, or nothing behind 'of'.
         KeyError: a name that is not there.
+        ImportError: a module that is not there.
     """
     subject, _, source = request.partition(" of ")
     names, *lists = source.split(";")
@@ -79,6 +80,8 @@ def published_part(request: str) -> str:
     }
     if kind not in forms:
         raise ValueError(f"no part is generated from '{request}'; known: {', '.join((*forms, *PARTS))}")
+    if not folders:
+        raise ValueError(f"'{request}' names nothing behind 'of'")
     content = forms[kind]()
     return content if isinstance(content, str) else markdown_table(content)
 
@@ -104,8 +107,8 @@ def _judge_runs(*folders: Path) -> tuple[dict[Claim, tuple[str, Judged]], dict[s
 def claim_rows(family: str, folders: Sequence[Path]) -> Rows:
     """Return a heading and a row of each test of a family that these runs judge; each claim once."""
     verdicts, labels = _judge_runs(*folders)
-    left_out = slice(4, 4 if family == "primary" else 5)  # others are shown without p
-    rows = [["Claim", "Tested", "Effect", "Interval", "p", "Verdict"]]
+    with_p = family == "primary"
+    rows = [["Claim", "Tested", "Effect", "Interval", *["p"] * with_p, "Verdict"]]
     before = ""
     for claim in (c for c in FAMILIES[family] if c in verdicts):
         relation = f"{labels[claim.lower]} {claim.relation} {labels[claim.higher]}"
@@ -116,12 +119,10 @@ def claim_rows(family: str, folders: Sequence[Path]) -> Rows:
         if effect is not None:
             size = ("×" if effect.scale == RATIO else "") + number(effect.shown)
             interval = " to ".join(number(end) for end in effect.interval or ()) or DASH
-        p = DASH if line.p is None else number(line.p, 2)
-        tested = f"{measure_of(line.compared).heading}: {relation}"
+        p = [number(line.p, 2)] * with_p
+        tested = f"{measure_of(line.compared.metric).heading}: {relation}"
         source = "" if name == folders[0].name else f" (`{name}`)"
-        rows.append([says, tested, size, interval, p, line.verdict + line.remark + source])
-    for row in rows:
-        del row[left_out]
+        rows.append([says, tested, size, interval, *p, line.verdict + line.remark + source])
     return rows
 
 

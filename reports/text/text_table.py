@@ -42,8 +42,9 @@ def text_rows(run: Run, table: Table, columns: Sequence[str] = ()) -> list[list[
 
 def remarks_on(rows: Sequence[Sequence[str]]) -> str:
     """Return what the marks in these rows mean, empty where there are none."""
-    marks = {mark for row in rows[1:] for cell in row for mark in MARKS if cell.endswith(mark)}
-    return " ".join(REMARKS[mark] for mark in sorted(marks))
+    ends = [cell[len(cell.rstrip(MARKS)) :] for row in rows[1:] for cell in row]
+    marks = sorted({*"".join(ends)})
+    return " ".join(REMARKS[mark] for mark in marks)
 
 
 def markdown_table(rows: Sequence[Sequence[str]]) -> str:

@@ -115,7 +115,7 @@ class Body:
     ) -> Callable[[ArrayLike, ArrayLike], NDArray[np.float64]]:
         """Return the function `vertices` of one shape, for callers that pose frame after frame.
 
-        All that depends on the shape alone is computed once, here. Raises BodyError.
+        The shaped vertices are computed once, here. Raises BodyError.
         """
         from scipy.sparse import csr_array  # a body that is not posed needs none
 

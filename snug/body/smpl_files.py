@@ -131,7 +131,7 @@ def _skeleton(arrays: Arrays, count: int) -> tuple[np.ndarray, np.ndarray, np.nd
     The first, (24, J), averages positions of joints; the second, (J, 24), adds up weights.
     """
     table = arrays["kintree_table"]
-    parents = table[0] if table.ndim == 2 else table
+    parents = table[0] if table.ndim == 2 and table.size else table
     layouts = "kintree_table (2, J) or parents (J,) of J = 24 (SMPL), 52 (SMPL-H) or 55 (SMPL-X) joints"
     if parents.ndim != 1 or len(parents) not in (24, 52, 55) or table.dtype.kind not in "iuf":
         raise BodyError(f"the tree of joints is {table.dtype} {table.shape}; expected {layouts}")
@@ -195,7 +195,7 @@ def _check_place(template: np.ndarray, joints: np.ndarray) -> None:
     for (side, out), (limb, start, end) in product((("left", 1), ("right", -1)), LIMITS):
         bone = at[f"{side}_{end}"] - at[f"{side}_{start}"]
         straight = out * bone[0] if limb == "arm" else -bone[1]
-        angle = np.degrees(np.arccos(straight / np.linalg.norm(bone)))
+        angle = np.degrees(np.arccos(straight / max(np.linalg.norm(bone), 1e-9)))
         if not angle <= LIMITS[limb, start, end]:
             raise BodyError(
                 f"the {side} {limb} is {angle:.0f} degrees off the T pose; pose it so at rest"

@@ -58,6 +58,12 @@ class Garment:
     material: Material = field(default_factory=Material)
     rest_uv: Array | None = None
 
+    def __post_init__(self) -> None:
+        """Raise GarmentError for weights that skin nothing or too much."""
+        weights, count = self.skinning_weights, len(self.rest_positions)
+        if weights.shape != (count, 24) or not np.allclose(weights.sum(axis=1), 1.0, atol=1e-4):
+            raise GarmentError(f"{self.name}: skinning_weights: give ({count}, 24), rows that sum to one")
+
     def cloth(self, material: Material | None = None) -> Cloth:
         """Return the rest state of simulator, loss and metrics, with the garment's own material or another.
 

@@ -3,8 +3,8 @@
 The solid is a union of three, each grown by its own distance:
 
 - the body itself, by `clearance` (this shapes shoulders and neck);
-- the torso, one convex section per height, which below the armpits never narrows again on the way down:
-  cloth hangs from its widest support; a flare widens it further, from the waist to the hem;
+- the torso, one convex section per height, which never narrows again below the armpits, for cloth hangs
+  from its widest support; a flare widens it from the waist to the hem;
 - the upper arm, one convex section per distance from the shoulder.
 
 A skirt is the same without sleeves, hanging from its waistband and widening from the hips on. For

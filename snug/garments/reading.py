@@ -68,8 +68,8 @@ def read_garment(file: GarmentFile | str | Path, body: Body) -> Garment:
     >>> garment.name, garment.rest_positions.shape, list(garment.loops)
     ('belt', (80, 3), ['waist', 'hem'])
     """
-    file = file if isinstance(file, GarmentFile) else GarmentFile(path=Path(file))
     try:
+        file = file if isinstance(file, GarmentFile) else GarmentFile(path=Path(file))
         raw = read_mesh(file.path)
         material = Material.from_file(file.material) if file.material else Material()
     except ValueError as error:

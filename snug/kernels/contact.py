@@ -12,7 +12,7 @@ import igl
 import numpy as np
 
 from reference_sim.geometry.leaf_bounds import closest_on_triangle
-from reference_sim.kernels.fast_kernels import TRAINING_LANES
+from reference_sim.kernels.fast_kernels import LANES
 from reference_sim.kernels.kernel_cache import njit
 from reference_sim.kernels.lanes import add_lanes, copy_lanes, mix_rows
 
@@ -87,9 +87,9 @@ PARTS = 255.0  # of a barycentric coordinate
 def byte_normals(positions: np.ndarray, faces: np.ndarray) -> np.ndarray:
     """Return vertex normals of positions (N, P, 3) as int8, 127 times unit length, see Patch.normals.
 
-    Normals of faces are summed up in the order of the faces, TRAINING_LANES frames side by side.
+    Normals of faces are summed up in the order of the faces, LANES frames side by side.
     """
-    L, (count, vertices, _) = TRAINING_LANES, positions.shape
+    L, (count, vertices, _) = LANES, positions.shape
     size, points, normals = 3 * vertices, positions.ravel(), np.empty(positions.shape, np.int8)
     skin, sums, out = np.empty(size * L, np.float32), np.empty(size * L, np.float32), normals.ravel()
     u, rounded = np.empty(9 * L, np.float32), np.empty(3 * L, np.int8)
@@ -160,9 +160,9 @@ def contact_energy(
     slack: np.float32, walk: bool, anchor_faces: np.ndarray, barycentric: np.ndarray, values: np.ndarray,
     gradients: np.ndarray,
 ) -> None:  # fmt: skip
-    """Sum k max(margin - d, 0)^power over samples into values (C, TRAINING_LANES); add gradients like x.
+    """Sum k max(margin - d, 0)^power over samples into values (C, LANES); add gradients like x.
 
-    x (C, V, 3, TRAINING_LANES); frames, rows (N, T). stencils, faces: uint32, for a signed index is first
+    x (C, V, 3, LANES); frames, rows (N, T). stencils, faces: uint32, for a signed index is first
     tested whether it counts from the end. Most samples are out of reach, and for them the loads cost
     most: all that they read of a frame is first laid together.
     """
@@ -174,7 +174,7 @@ def contact_energy(
     skin, m = np.zeros(size + 1, np.float32), np.zeros(size + 1, np.float32)
     for n in range(frames.size):
         frame, window = divmod(n, len(frames))
-        block, lane = divmod(n, TRAINING_LANES)
+        block, lane = divmod(n, LANES)
         for v in range(vertices):
             for c in range(3):
                 garment[3 * v + c] = x[block, v, c, lane]

@@ -1,4 +1,4 @@
-"""Forward and backward of the recurrent network in closed form, in place of autograd, for training on a CPU.
+"""Recurrent network in closed form, forward and backward, for training on a CPU.
 
 For each layer, with gates r, z, candidate n and q = W_hn h + b_hn (torch.nn.GRU's convention):
 
@@ -19,7 +19,7 @@ import torch
 from llvmlite.binding import get_host_cpu_name
 from torch import Tensor, nn
 
-from reference_sim.kernels.fast_kernels import TRAINING_LANES
+from reference_sim.kernels.fast_kernels import LANES
 from reference_sim.kernels.kernel_cache import njit
 from reference_sim.kernels.lanes import copy_lanes
 
@@ -56,7 +56,7 @@ class FastGRU(torch.autograd.Function):
     """apply(x (N, T, D), state (L, N, H), *weights) -> (N, T, H), (L, N, H).
 
     weights: input, hidden, input bias, hidden bias of each layer. Differentiable once, by the weights
-    alone. Between products a row of units is as wide as the next multiple of TRAINING_LANES, and 0
+    alone. Between products a row of units is as wide as the next multiple of LANES, and 0
     beyond H.
     """
 
@@ -68,7 +68,7 @@ class FastGRU(torch.autograd.Function):
         for layer, start in enumerate(state):
             w_i, w_h, b_i, b_h = weights[4 * layer : 4 * layer + 4]
             (frames, count), size = x.shape[:2], w_h.shape[1]
-            wide = size + -size % TRAINING_LANES
+            wide = size + -size % LANES
             inputs = _widen(product(x.flatten(0, 1), w_i, b_i), size).view(frames, count, -1)
             hidden = x.new_zeros(frames + 1, count, wide)
             gates = x.new_empty(frames, count, 4 * wide)  # r, z, n, q
@@ -76,7 +76,7 @@ class FastGRU(torch.autograd.Function):
             for t in range(frames):
                 recurrent = _widen(product(hidden[t, :, :size].contiguous(), w_h, b_h), size)
                 arrays = inputs[t], recurrent, hidden[t], gates[t], hidden[t + 1]
-                _cell(*(array.numpy().ravel() for array in arrays), wide // TRAINING_LANES)
+                _cell(*(array.numpy().ravel() for array in arrays), wide // LANES)
             saved += [x, gates, hidden]
             x = hidden[1:, :, :size].contiguous()
             last.append(hidden[-1, :, :size])
@@ -115,22 +115,22 @@ def _backpropagate(y: Tensor, gates: Tensor, hidden: Tensor, w_h: Tensor) -> tup
     back, y = y.new_zeros(count, wide), _widen(y.contiguous(), size)
     arrays = [tensor.numpy() for tensor in (y, gates, hidden, to_inputs, to_recurrent)]
     for t in reversed(range(frames)):
-        _cell_back(back.numpy().ravel(), *(array[t].ravel() for array in arrays), wide // TRAINING_LANES)
+        _cell_back(back.numpy().ravel(), *(array[t].ravel() for array in arrays), wide // LANES)
         if t:
             back[:, :size] += product(_narrow(to_recurrent[t], size), w_h.t())
     return _narrow(to_inputs.flatten(0, 1), size), _narrow(to_recurrent.flatten(0, 1), size)
 
 
 def _widen(rows: Tensor, size: int) -> Tensor:
-    """Fill each of the k parts of rows (..., k H), H of this size, with 0 to a multiple of TRAINING_LANES."""
-    if size % TRAINING_LANES == 0:
+    """Fill each of the k parts of rows (..., k H), H of this size, with 0 to a multiple of LANES."""
+    if size % LANES == 0:
         return rows
-    return nn.functional.pad(rows.unflatten(-1, (-1, size)), (0, -size % TRAINING_LANES)).flatten(-2)
+    return nn.functional.pad(rows.unflatten(-1, (-1, size)), (0, -size % LANES)).flatten(-2)
 
 
 def _narrow(rows: Tensor, size: int) -> Tensor:
     """Return rows without the zeros of `_widen`."""
-    return rows.unflatten(-1, (-1, size + -size % TRAINING_LANES))[..., :size].flatten(-2)
+    return rows.unflatten(-1, (-1, size + -size % LANES))[..., :size].flatten(-2)
 
 
 @njit(cache=True, inline="always", fastmath=FAST, error_model="numpy")
@@ -154,9 +154,9 @@ def _cell(
 ) -> None:
     """Compute one frame of a layer: r, z, n, q (N, 4H) and h' (N, H) from W_i x, W_h h (N, 3H) and h (N, H).
 
-    All flat, with H, widened, of so many blocks of TRAINING_LANES.
+    All flat, with H, widened, of so many blocks of LANES.
     """
-    L, u = TRAINING_LANES, np.empty(7 * TRAINING_LANES, np.float32)
+    L, u = LANES, np.empty(7 * LANES, np.float32)
     for place in range(len(after) // L):
         row, block = divmod(place, blocks)
         for part in range(3):
@@ -189,7 +189,7 @@ def _cell_back(
 
     back (N, H), the gradient by h' from later frames, becomes the part that passes to h through z alone.
     """
-    L, u = TRAINING_LANES, np.empty(7 * TRAINING_LANES, np.float32)
+    L, u = LANES, np.empty(7 * LANES, np.float32)
     for place in range(len(back) // L):
         row, block = divmod(place, blocks)
         for part in range(4):

@@ -40,7 +40,7 @@ def skin_frame(
     offsets (3 V',) and rest (3, V'), the unposed garment [m]: in this order (V,) of vertices and with
     others behind them, in blocks of VERTEX_BLOCK; joints[first[b]:first[b + 1]] move block b, with shares
     (., VERTEX_BLOCK).
-    transforms (J, 3, 4), pelvis (3,) [m], float64; all other real numbers are float32.
+    transforms (J, 3, 4). pelvis (3,) [m] is float64, all other real numbers are float32.
     """
     count, padded = len(order), rest.shape[1]
     # Points and their images: nothing overlaps in one small array.

@@ -1,12 +1,12 @@
-"""Skinning of many frames of one garment in closed form, for training on a CPU, and their layout in memory.
+"""Skinning of many frames in closed form, for training on a CPU, and their layout in memory.
 
 Few joints move a vertex, so each adds its share alone. tests/snug/body/test_body.py compares values and
 gradients with `snug.body.skinning.skin`.
 
 The loops run over frames that lie side by side. Vertices (N, T, V, 3) of N windows of T frames lie in
-memory as C blocks of TRAINING_LANES frames, (C, V, 3, TRAINING_LANES): the first frames of all windows,
+memory as C blocks of LANES frames, (C, V, 3, LANES): the first frames of all windows,
 then the second ones, and so on. Skinning writes this layout and the kernels of the energies and of
-contact take it as it is. For TRAINING_LANES windows, as training has, the tensor is a view of it, for
+contact take it as it is. For LANES windows, as training has, the tensor is a view of it, for
 most other numbers a copy. Its shape is (N, T, V, 3) in any case, so terms without a kernel work on it
 too.
 """
@@ -19,26 +19,26 @@ import numpy as np
 import torch
 from torch import Tensor, nn
 
-from reference_sim.kernels.fast_kernels import TRAINING_LANES
+from reference_sim.kernels.fast_kernels import LANES
 from reference_sim.kernels.kernel_cache import njit
 from reference_sim.kernels.lanes import copy_lanes
 
 
 def to_lanes(x: Tensor) -> np.ndarray:
-    """Lay out (N, T, ...) as (C, ..., TRAINING_LANES); lanes beyond the last frame repeat it.
+    """Lay out (N, T, ...) as (C, ..., LANES); lanes beyond the last frame repeat it.
 
-    C = ceil(T N / TRAINING_LANES).
+    C = ceil(T N / LANES).
     """
     x = x.detach().transpose(0, 1)
-    if x.shape[1] % TRAINING_LANES:
+    if x.shape[1] % LANES:
         rows = x.flatten(0, 1)
-        x = torch.cat([rows, rows[-1:].expand(-len(rows) % TRAINING_LANES, *rows.shape[1:])])[None]
-    return x.unflatten(1, (-1, TRAINING_LANES)).movedim(2, -1).flatten(0, 1).contiguous().numpy()
+        x = torch.cat([rows, rows[-1:].expand(-len(rows) % LANES, *rows.shape[1:])])[None]
+    return x.unflatten(1, (-1, LANES)).movedim(2, -1).flatten(0, 1).contiguous().numpy()
 
 
 def from_lanes(lanes: np.ndarray, windows: int, frames: int) -> Tensor:
-    """Return (C, ..., TRAINING_LANES) as (N, T, ...), the inverse of `to_lanes`."""
-    whole = windows % TRAINING_LANES == 0  # then no block holds frames of two times
+    """Return (C, ..., LANES) as (N, T, ...), the inverse of `to_lanes`."""
+    whole = windows % LANES == 0  # then no block holds frames of two times
     x = torch.from_numpy(lanes).unflatten(0, (frames if whole else 1, -1)).movedim(-1, 2).flatten(1, 2)
     if not whole:
         x = x[0, : frames * windows].unflatten(0, (frames, windows))
@@ -55,12 +55,12 @@ class FastSkin(torch.autograd.Function):
     @staticmethod
     def forward(ctx: Any, points: Tensor, weights: Tensor, transforms: Tensor) -> Tensor:
         """Return the posed points."""
-        entries = to_lanes(transforms.flatten(-2))  # (C, J, 12, TRAINING_LANES)
+        entries = to_lanes(transforms.flatten(-2))  # (C, J, 12, LANES)
         ctx.moving = weights.numpy(), entries.reshape(*entries.shape[:2], -1)
         columns = points.detach().permute(2, 3, 1, 0).flatten(2)  # (V, 3, T N)
-        if columns.shape[2] % TRAINING_LANES:
-            columns = nn.functional.pad(columns, (0, -columns.shape[2] % TRAINING_LANES))
-        posed = np.empty((len(entries), len(weights), 3, TRAINING_LANES), np.float32)
+        if columns.shape[2] % LANES:
+            columns = nn.functional.pad(columns, (0, -columns.shape[2] % LANES))
+        posed = np.empty((len(entries), len(weights), 3, LANES), np.float32)
         _pose(columns.contiguous().numpy().ravel(), *ctx.moving, posed.ravel())
         return from_lanes(posed, *points.shape[:2])
 
@@ -69,7 +69,7 @@ class FastSkin(torch.autograd.Function):
         """Return the gradient by the points."""
         windows, frames, vertices, _ = above[0].shape
         weights, entries = ctx.moving
-        back = np.empty((vertices, 3, len(entries), TRAINING_LANES), np.float32)
+        back = np.empty((vertices, 3, len(entries), LANES), np.float32)
         _turn_back(to_lanes(above[0]).ravel(), weights, entries, back.ravel())
         columns = torch.from_numpy(back).flatten(2)[..., : frames * windows]
         return columns.unflatten(2, (frames, windows)).permute(3, 2, 0, 1), None, None
@@ -80,7 +80,7 @@ class FastSkin(torch.autograd.Function):
 @njit(cache=True, fastmath={"contract"}, error_model="numpy")
 def _pose(points: np.ndarray, weights: np.ndarray, entries: np.ndarray, out: np.ndarray) -> None:
     """Pose flat points (V, 3, C, L) by weights (V, J), entries (C, J, 12 L) into flat out (C, V, 3, L)."""
-    L, (vertices, joints), blocks = TRAINING_LANES, weights.shape, len(entries)
+    L, (vertices, joints), blocks = LANES, weights.shape, len(entries)
     u = np.empty(6 * L, np.float32)
     moving = np.empty(joints, np.int64)
     for v in range(vertices):
@@ -107,7 +107,7 @@ def _pose(points: np.ndarray, weights: np.ndarray, entries: np.ndarray, out: np.
 @njit(cache=True, fastmath={"contract"}, error_model="numpy")
 def _turn_back(above: np.ndarray, weights: np.ndarray, entries: np.ndarray, out: np.ndarray) -> None:
     """Compute the gradients by the points, laid out like these: the transpose of each rotation part."""
-    L, (vertices, joints), blocks = TRAINING_LANES, weights.shape, len(entries)
+    L, (vertices, joints), blocks = LANES, weights.shape, len(entries)
     u = np.empty(6 * L, np.float32)
     moving = np.empty(joints, np.int64)
     for v in range(vertices):

@@ -173,12 +173,16 @@ def read_amc(path: Path, bones: dict[str, Bone], metres: float) -> dict[str, np.
 
     def parse(lines: Iterator[list[str]]) -> list[dict[str, list[float]]]:
         frames: list[dict[str, list[float]]] = []
+        numbers: list[int] = []
         for word, *tokens in lines:
             if word.lower() == ":radians":
                 raise ValueError("only angles in degrees are read")
             if word.startswith(":"):
                 continue
             if not tokens and word.isdigit():
+                if numbers and int(word) != numbers[-1] + 1:
+                    raise ValueError(f"frame {word} follows frame {numbers[-1]}; fetch it again")
+                numbers.append(int(word))
                 frames.append({})
             elif word not in moving or not frames:
                 raise ValueError(f"'{word[:40]}' is no bone of the skeleton, or before the first frame")

@@ -1,9 +1,8 @@
 """Motions from files of motion capture, ready to use: checked, y up, resampled, arms spread.
 
 Arrays of SMPL's joints, axis-angle relative to the parent joint, are read by their names from .npz in
-AMASS's layout and from pickled dicts. SMPL, SMPL+H and SMPL-X begin with the same 22 joints.
-Only SMPL's own two hand joints are the ones of our tree; the others carry fingers there, which a garment
-never meets. Shape coefficients and soft tissue are left out: shape is the caller's choice.
+AMASS's layout and from pickled dicts. SMPL, SMPL+H and SMPL-X begin with the same 22 joints; fingers,
+shape coefficients and soft tissue are left out.
 
 | content | arrays, the first that is there | shape, T frames |
 | --- | --- | --- |

@@ -67,8 +67,7 @@ def clip_of(name: str) -> str:
     return SEGMENTS[name].clip if name in SEGMENTS else name
 
 
-# Whole recorded clips. A walk is first: preset smoke trains on it. The last is held out of trainings
-# that are stopped by a training clip.
+# Whole recorded clips. A walk is first: preset smoke trains on it.
 TRAIN: tuple[str, ...] = (
     "07_01", "02_01", "02_02", "02_03", "02_04", "02_05", "01_05",
     "05_01", "05_04", "05_07", "05_11", "05_12", "05_13", "05_18", "05_20",

@@ -27,7 +27,7 @@ class MotionError(ValueError):
     """A motion that cannot be read, named or built; the message says where and what to do."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Motion:
     """Joint rotations and root translations over time.
 

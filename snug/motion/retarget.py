@@ -1,4 +1,4 @@
-"""Put the motion of a foreign skeleton on ours: joints matched by name, every limb points where theirs does.
+"""Put a foreign skeleton's motion on ours: joints matched by name, limbs pointing where theirs do.
 
 Our joint j turns in the world by G_j = G_b A_j. Theirs turns by G_b from the zero pose, and A_j turns our
 resting limb t_j into theirs there, d_b: its far end then points along G_b A_j t_j = G_b d_b. How a limb

@@ -1,4 +1,4 @@
-"""A body and the garment it wears, as tensors a network works on: inputs, joint transforms, skinned vertices.
+"""A body and its garment as tensors of a network: inputs, joint transforms, skinned vertices.
 
 Everything a network or its loss sees is relative to the pelvis (the posed joint 0) of its own frame,
 where float32 keeps its digits and the energy of gravity is zero. The pelvis is added in float64.
@@ -55,14 +55,16 @@ class DressedBody:
         return self._weights[smoothing]
 
     def rest(self, betas: np.ndarray | None = None) -> Tensor:
-        """Return the unposed garment without offsets, (V, 3) [m], on the body of shape (10,).
+        """Return the unposed garment without offsets, (V, 3) [m], on the body of shape (S,).
 
-        Shapes (N, 10) give (N, V, 3); None is the mean body.
+        Shapes (N, S) give (N, V, 3); None is the mean body.
         """
         mean = torch.as_tensor(self.garment.rest_positions, dtype=torch.float32)
         if betas is None:
             return mean
         shapes = torch.as_tensor(betas, dtype=torch.float32)
+        if shapes.shape[-1] != (count := len(self.rest_directions)):
+            raise ValueError(f"betas {tuple(shapes.shape)}: expected (..., {count})")
         return mean + torch.einsum("...s,svi->...vi", shapes, self.rest_directions)
 
     @cached_property

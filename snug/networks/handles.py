@@ -2,10 +2,8 @@
 
     offsets(theta)_v = sum_b w_b(v) A_b(theta) [(r_v - c_b) / h; 1]        (shape_functions)
 
-A small perceptron that sees one pose, as PBNS does, gives the twelve numbers of each A_b. What it can
-express is the span of the shape functions.
-
-The offsets are of the unposed garment r, as SNUG's, so that it is skinned. The centres c are farthest
+A small perceptron that sees one pose, as PBNS does, gives the twelve numbers of each A_b. The offsets are
+of the unposed garment r, as SNUG's, which is then skinned. The centres c are farthest
 points of the garment, each the vertex that lies farthest from those before it. The weights are compact,
 w_b ~ (1 - d_b/R)^4 (4 d_b/R + 1) for distances d_b < R (Wendland 1995), and sum to one in each vertex, so
 that equal transforms of all handles move the garment affinely. h is the covering radius, the largest

@@ -46,8 +46,8 @@ def roll_out(
         dressed: the body and the garment that the model was trained for.
         motion: T frames.
         betas: shape numbers of the body; None is the mean body.
-        quasi_static: give instead, for each frame, the output after that pose was held still for a
-            second: the network's static answer. Nothing of it is timed.
+        quasi_static: give instead, for each frame, the output after that pose was held still for 30
+            frames: the network's static answer. Nothing of it is timed.
 
     Returns:
         World positions (T, V, 3) [m], float64; status `diverged` if one is not finite.
@@ -78,7 +78,7 @@ def prepare_roll_out(
     earlier: Motion | None = None,
     postprocess: Callable[[np.ndarray, int], np.ndarray] | None = None,
 ) -> Callable[[], Trajectory]:
-    """Do all that comes before the first frame; return a function that gives the trajectory of `roll_out`.
+    """Prepare all frames; return a function that gives the trajectory of `roll_out`.
 
     Every frame is computed; the trajectory holds those whose numbers are `kept`, None for all.
     `postprocess` is applied to each frame's positions (V, 3) [m] and number. All else: see
@@ -87,15 +87,18 @@ def prepare_roll_out(
     frames = prepare_frames(model, dressed, motion, betas, earlier=earlier)
     numbers = np.arange(motion.frames) if kept is None else kept
     places = {int(frame): place for place, frame in enumerate(numbers)}
+    if not set(places) <= set(range(motion.frames)):
+        raise ValueError(f"kept frames {sorted(places)}: {motion.name} has 0 to {motion.frames - 1}")
 
     def run() -> Trajectory:
         positions, seconds = np.empty((len(numbers), dressed.vertices, 3)), np.empty(len(numbers))
         clock = time.perf_counter()
         for frame, x in enumerate(frames()):
             x = x if postprocess is None else postprocess(x, frame)
-            before, clock = clock, time.perf_counter()
+            elapsed = time.perf_counter() - clock
             if frame in places:
-                positions[places[frame]], seconds[places[frame]] = x, clock - before
+                positions[places[frame]], seconds[places[frame]] = x, elapsed
+            clock = time.perf_counter()
         return _trajectory(model, dressed, motion, positions, numbers, seconds)
 
     return run
@@ -104,7 +107,7 @@ def prepare_roll_out(
 def prepare_batch(
     model: TrainedModel, dressed: DressedBody, motion: Motion, *, copies: int
 ) -> Callable[[], np.ndarray]:
-    """Return a function that computes `copies` bodies in that motion at once, (T, copies, V, 3) [m], float32.
+    """Return a function that computes `copies` bodies at once, (T, copies, V, 3) [m], float32.
 
     Positions are relative to the pelvis. Frame follows frame, as the state is carried. Raises
     ValueError.
@@ -226,7 +229,7 @@ def prepare_frame_inputs(
     *,
     earlier: Motion | None = None,
 ) -> Callable[[int], tuple[Tensor | None, Tensor, np.ndarray]]:
-    """Return a function that makes one frame's inputs from its pose and those before, as an application does.
+    """Return a function that makes one frame's inputs from its pose and those before.
 
     It gives features (D,), or None without a model, joint transforms (24, 3, 4) and pelvis (3,) [m]: the
     same numbers that `prepare_frames` makes for all frames at once. Raises ValueError.

@@ -13,6 +13,7 @@ from torch import Tensor
 
 from snug.networks.tensor_file import TensorFileError, read_tensors, write_tensors
 from snug.training.optimisation_step import Trainer
+from snug.training.simulated_data import settings_of
 
 CHECKPOINT_FORMAT = "snug-checkpoint-9"
 
@@ -76,12 +77,15 @@ class Checkpoint:
 
 def describe_run(trainer: Trainer, **facts: Any) -> dict[str, Any]:
     """Return the facts that must be equal for two runs to be the same run."""
-    digest, data, dressed = hashlib.sha256(), trainer.data, trainer.dressed
+    digest, data = hashlib.sha256(), trainer.data
     tensors = [data.features, data.transforms, data.lead, data.rest, trainer.weights]
     tensors += [trainer.targets.vertices] if trainer.targets else []
-    body, cloth = dressed.body, dressed.cloth
-    shape = (body.template, body.faces, body.shape_directions, body.joint_directions)
-    for array in (*(tensor.cpu().numpy() for tensor in tensors), *shape, cloth.Dm_inverse):
+    body, garment = trainer.dressed.body, trainer.dressed.garment
+    for array in (
+        *(tensor.cpu().numpy() for tensor in tensors),
+        body.shape_directions,
+        body.joint_directions,
+    ):
         digest.update(array.tobytes())
     return {
         "kind": trainer.kind,
@@ -92,8 +96,7 @@ def describe_run(trainer: Trainer, **facts: Any) -> dict[str, Any]:
         "threads": torch.get_num_threads(),
         "device": trainer.device.type,
         "kernels": trainer.kernels,
-        "vertices": dressed.vertices,
         "data": digest.hexdigest(),
-        "material": asdict(cloth.material),
+        **settings_of(body, garment),
         **facts,
     }

@@ -5,8 +5,8 @@ so that d = n.(x - c). Searching it in every step would cost more than the rest 
 an anchor (a body face and barycentric coordinates) is kept for each frame and sample; body vertices of
 the frame carry it to a plane in no time. It walks with its sample (snug.kernels.contact), and a few
 frames of each batch are searched anew (snug.training.contact_planes), by the simulator's own search and
-rule of regions. Positions are float32, relative to the pelvis. With thousands of frames cached, an anchor
-has four bytes: barycentric coordinates are whole 255ths, which moves it along its face by some 0.03 mm.
+rule of regions. Positions are float32, relative to the pelvis. An anchor has four bytes: barycentric
+coordinates are whole 255ths, which moves it along its face by some 0.03 mm.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ import numpy as np
 
 from reference_sim.energies import ContactPenalty
 from reference_sim.geometry.closest_point import FaceSearch
-from reference_sim.kernels.fast_kernels import TRAINING_LANES
+from reference_sim.kernels.fast_kernels import LANES
 from reference_sim.obstacle import DEFAULT_REGION, reachable_faces
 from snug.kernels.contact import PARTS, WALK_SLACK, byte_normals, contact_energy, triangle_adjacency
 
@@ -109,14 +109,14 @@ class ContactCache:
         *,
         walk: bool = False,
     ) -> np.ndarray:
-        """Return the contact energy (C, TRAINING_LANES) [J] of garments; add its gradient to `gradients`.
+        """Return the contact energy (C, LANES) [J] of garments; add its gradient to `gradients`.
 
-        Garments x (C, V, 3, TRAINING_LANES) lie as in snug.kernels.skinning, the patch of each of the
+        Garments x (C, V, 3, LANES) lie as in snug.kernels.skinning, the patch of each of the
         frames (N, T) in its row (N, T) of positions [m] and normals (R, P, 3). With `walk`, anchors near
         the skin first walk to where their samples are, and stay there. Lanes beyond the last frame are
         zero.
         """
-        values, patch = np.zeros((len(x), TRAINING_LANES), np.float32), self.patch
+        values, patch = np.zeros((len(x), LANES), np.float32), self.patch
         body = positions, normals, patch.faces.view(np.uint32), patch.adjacency, patch.centroids
         limits = np.float32(patch.region**2), np.float32(WALK_SLACK), walk
         contact_energy(

@@ -131,7 +131,7 @@ class BodyPatches:
 
 
 class NearestVertices:
-    """Tangent planes at the body vertices nearest to those of the garment: nothing is kept from step to step.
+    """Tangent planes at the body vertices nearest to the garment's; nothing is kept between steps.
 
     As SNUG's authors have published it (github.com/isantesteban/snug, losses/physics.py, lines 138 to 148;
     layers.py, lines 38 to 56; normals in smpl.py): all vertices of the body, normals weighted by area. Planes

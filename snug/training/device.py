@@ -38,7 +38,7 @@ def find_device(name: str) -> torch.device:
 
 
 def compile_for(function: Callable[P, R], device: torch.device) -> Callable[P, R]:
-    """Return the function compiled by torch for a GPU, where launching small kernels takes most of the time.
+    """Return the function compiled by torch for a GPU, where launching kernels takes most time.
 
     It is returned as it is on a CPU, where the kernels take its place, and where Triton or a C compiler
     is missing. It is compiled once for each size of its arguments, at the first call.

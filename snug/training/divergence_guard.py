@@ -7,7 +7,6 @@ Three cases, from harmless to grave:
   size of the usual energy, which is negative where a garment hangs below the pelvis: the network is lost.
   Weights and Adam's moments go back to the last ones seen to be good, and the learning rate is halved.
 A recipe with a spike beyond all energies, as the paper's, is left alone until something is not finite.
-No decision comes from a clock, so a run with incidents repeats as exactly as one without.
 """
 
 from __future__ import annotations
@@ -67,12 +66,14 @@ class DivergenceGuard:
         bad = ~np.isfinite(joules)
         if bad.any():
             self._leave_out(np.flatnonzero(bad), "update left out")
+            self._count_bad()
             return "leave out"
         spike = math.inf if self.spike is None or number < SETTLING else self.spike
         mean = float(joules.mean(dtype=np.float64))
         peaks = joules > spike
         runaway = self.usual is not None and mean > max(spike, RUNAWAY * abs(self.usual))
         if runaway and self._count_bad():
+            self.summary["skipped_updates"] += 1
             return "leave out"
         if not runaway:
             self.usual = mean if self.usual is None else MEMORY * self.usual + (1 - MEMORY) * mean
@@ -96,6 +97,8 @@ class DivergenceGuard:
                     self.good_step = self._number
             return True
         self._leave_out(np.argmax(self._joules, keepdims=True), "gradient not finite, update left out")
+        if verdict != "distrust":  # which has been counted
+            self._count_bad()
         return False
 
     def _leave_out(self, rows: np.ndarray, action: str) -> None:
@@ -105,7 +108,6 @@ class DivergenceGuard:
         if self.skipped_in_a_row >= GIVE_UP:
             name = self._name(int(rows[0]))
             raise TrainingError(f"training diverged: {GIVE_UP} updates in a row not finite, last {name}")
-        self._count_bad()
 
     def _count_bad(self) -> bool:
         """Count one more bad batch; return whether that brought good weights back."""

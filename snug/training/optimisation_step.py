@@ -115,9 +115,11 @@ class Trainer:
             self.loss = PhysicsLoss(
                 self.dressed.cloth, recipe, dt=self.data.dt, device=self.device, kernels=self.kernels
             )
-            if recipe.contact_samples == "nearest_vertices":
+            if "collision" not in recipe.terms:
+                pass
+            elif recipe.contact_samples == "nearest_vertices":
                 self.nearest = NearestVertices(self.data)
-            elif "collision" in recipe.terms:
+            else:
                 self.contact = TrainingContact(
                     self.data, self.loss.contact, fixed=not self.shaped, kernels=self.kernels
                 )

@@ -9,12 +9,10 @@ in joules a frame: the mean of each term over the frames that have it. A frame h
 frames before it are in the window; its gradient reaches all three. So the terms of a frame weigh as in
 equation 5, however long the window is. The recipe names two other forms of inertia (Recipe.inertia_form).
 
-Each energy is one torch expression in `reference_sim.energies`, the definition. On a CPU closed-form
-kernels (those that a term declares as "training_batch", or its own gradient) give the same values and
-gradients in a small part of the time. On a GPU the definitions are compiled by torch.
-The contact planes are the one difference: training keeps an anchor for each sample, and takes the skin's
-normal there, where the simulator searches anew in every step and takes the direction to the closest
-point.
+Each energy is one torch expression in `reference_sim.energies`, the definition, which torch compiles on a
+GPU. On a CPU closed-form kernels ("training_batch" of a term, or its gradient) give the same numbers.
+The contact planes alone differ: training keeps an anchor for each sample, with the skin's normal, where
+the simulator searches the closest point anew in every step.
 
 The material of PBNS itself (Bertiche et al. 2021), springs, hinges, uniform mass, squared contact::
 
@@ -49,7 +47,7 @@ from reference_sim.energies import (
 )
 from reference_sim.energies.inertia import batch_of_windows
 from reference_sim.kernels.fast_kernels import (
-    TRAINING_LANES,
+    LANES,
     BatchKernel,
     fast_kernel,
     has_kernel,
@@ -156,7 +154,7 @@ class ClosedForms(torch.autograd.Function):
 
 
 class ClosedForm(torch.autograd.Function):
-    """An energy of each configuration of a batch by its own closed form, one configuration after the other.
+    """An energy of a batch by its closed form, one configuration after the other.
 
     apply(x (..., V, 3), energy) -> (...) [J]. Differentiable once, by x alone.
     """
@@ -178,7 +176,7 @@ class ClosedForm(torch.autograd.Function):
 
 
 def has_closed_form(energy: Energy) -> bool:
-    """Return whether its gradient is known in closed form; automatic differentiation gives that of others."""
+    """Return whether its gradient is known in closed form; others are differentiated automatically."""
     closed_form = type(energy).value_and_gradient is not Energy.value_and_gradient
     return has_kernel(energy, "training_batch") or closed_form
 
@@ -274,7 +272,7 @@ class PhysicsLoss:
     def _kernels(self, x: Tensor, lead: Tensor, planes: Planes | None) -> dict[str, BatchKernel]:
         """Return the kernels in lanes of the terms that have one, by name of the term."""
         kernels = dict(self._batches)
-        in_lanes = self.inertia_form == "equation_5" and len(x) % TRAINING_LANES == 0
+        in_lanes = self.inertia_form == "equation_5" and len(x) % LANES == 0
         if "inertia" in self.terms and x.shape[1] >= 3 and in_lanes:
             weight = x.shape[1] / (x.shape[1] - 2)
             kernels["inertia"] = batch_of_windows(self.inertia, to_lanes(lead), len(x), weight)

@@ -187,6 +187,8 @@ def law(engine: Engine, name: str, sample: str) -> Answer:
 def budgeted(engine: Engine, factor: int, what: str) -> Answer:
     """Return a budget's distance from the engine's own limit [%], or the time of a frame [ms]."""
     runs, limit_not_reached = ladder(engine.name)
+    if factor not in runs and factor < max(runs):
+        raise EngineDiverged("at this budget")
     if factor not in runs:
         return None, f"nothing moved any more at {max(runs)} times the default"
     if what == "time":
@@ -268,10 +270,7 @@ def reference_ladder(substeps: int | None) -> dict[int, RollOut]:
 
 
 def _within(runs: dict[int, RollOut]) -> int | None:
-    """Return the least budget from which on all are within CONVERGED of the largest; it must not be it.
-
-    None where only the largest is.
-    """
+    """Return the least budget from which on all are within CONVERGED of the largest; None but for it."""
     result = None
     for budget in sorted(runs, reverse=True)[1:]:
         if distance(runs[budget], runs[max(runs)]) > CONVERGED:

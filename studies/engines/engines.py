@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from engine_runs import Engine, EngineCloth
+from engine_runs import Engine, EngineCloth, EngineDiverged
 from newton_cloth import NewtonCloth
 from reference_sim import GRAVITY, Cloth
 from reference_sim.energies import BendHinge, Gravity, StretchStVK
@@ -35,7 +35,7 @@ class ReferenceCloth(EngineCloth):
         self._steppers: dict[float, TimeStepper] = {}
 
     def advance(self, x: np.ndarray, v: np.ndarray, dt: float) -> tuple[np.ndarray, np.ndarray]:
-        """Take one step. Raises ValueError where it diverges."""
+        """Take one step. Raises EngineDiverged."""
         if dt not in self._steppers:
             terms = [*self.energies, Gravity(self.cloth)]
             self._steppers[dt] = TimeStepper(
@@ -43,7 +43,7 @@ class ReferenceCloth(EngineCloth):
             )
         after, (result,) = self._steppers[dt].advance(1, State(x, v), None)
         if after is None:
-            raise ValueError(f"the reference diverged: {result.reason}")
+            raise EngineDiverged(f"the reference diverged: {result.reason}")
         return after.x, after.v
 
 

@@ -255,13 +255,13 @@ class NewtonSolver(Method):
         positions, seconds, status, reason = [x], [0.0], "ok", ""
         clock = time.perf_counter()
         for frame in range(1, scene.frames):
-            held = x[pins]
-            target = held if scene.pin_positions is None else scene.pin_positions(frame)
+            pinned = x[pins]
+            target = pinned if scene.pin_positions is None else scene.pin_positions(frame)
             for j in range(1, self.substeps + 1):
                 if scene.pin_positions is not None:
                     share = j / self.substeps
                     x = x.copy()
-                    x[pins] = (1 - share) * held + share * target
+                    x[pins] = (1 - share) * pinned + share * target
                 x, v = self.newton.advance(x, v, scene.dt / self.substeps)
             if not (np.isfinite(x).all() and np.abs(x).max() < FAR):
                 status, reason = "diverged", f"frame {frame}: a vertex is nowhere, or {FAR:g} m away"

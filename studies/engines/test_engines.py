@@ -335,14 +335,14 @@ def test_newton_descends_the_energy_that_we_say_it_does(solver, energy, iteratio
 
 def test_pins_move_evenly_over_the_sub_steps_of_a_frame(monkeypatch):
     """The solver is a fake that moves nothing, so it is tested without newton too."""
-    seen = []
+    pin_positions = []
 
     class Still:
         def __init__(self, cloth, iterations, solver):
             pass
 
         def advance(self, x, v, dt):
-            seen.append(x[scene.cloth.pins].copy())
+            pin_positions.append(x[scene.cloth.pins].copy())
             return x.copy(), v
 
     cloth, up = regular_sheet(4), np.array([0.0, 0.1, 0.0])
@@ -355,9 +355,9 @@ def test_pins_move_evenly_over_the_sub_steps_of_a_frame(monkeypatch):
     monkeypatch.setitem(sys.modules, "newton", SimpleNamespace(__version__="fake"))
     method = newton_cloth.make(models=None, seed=0, solver="VBD", iterations=1, substeps=4)
     method.prepare(scene)
-    seen.clear()
+    pin_positions.clear()
     trajectory = method.run()
-    risen = np.array(seen)[:, 0, 1] - handles[0, 1]
+    risen = np.array(pin_positions)[:, 0, 1] - handles[0, 1]
     assert risen == pytest.approx(0.025 * np.arange(1, 9))
     for frame in (1, 2):
         assert np.array_equal(trajectory.positions[frame][scene.cloth.pins], scene.pin_positions(frame))

@@ -204,14 +204,14 @@ def read_gauge(folder: Path) -> tuple[Fabric, ...]:
     path = next((path for path in paths if path.is_file()), paths[-1])
     try:
         materials = json.loads(path.read_text(encoding="utf-8"))["assets"]["textile"]["material"]
-        read = {key: (float(m["density"]), float(m["bend stiffness"])) for key, m in materials.items()}
+        data = {key: (float(m["density"]), float(m["bend stiffness"])) for key, m in materials.items()}
     except (OSError, KeyError, TypeError, AttributeError, ValueError) as error:
         reason = f"not the metadata of a textile task ({type(error).__name__}: {error})"
         raise DeclarationError(f"{path}: {reason}: download it again") from None
     return _named_apart(
         [
             _in_range(f"{path}: {key}", Fabric(plain_name(key), density, k, k))
-            for key, (density, k) in read.items()
+            for key, (density, k) in data.items()
         ]
     )
 

@@ -250,8 +250,8 @@ def test_a_drape_is_compared_with_the_references():
 
     def roll_out(scale):
         frames = np.repeat((built.start * [scale, 1.0, scale])[None], built.frames, axis=0)
-        made = Trajectory(frames, built.cloth.faces, built.dt * np.arange(built.frames))
-        return RollOut(group, find_method("simulation"), made)
+        result = Trajectory(frames, built.cloth.faces, built.dt * np.arange(built.frames))
+        return RollOut(group, find_method("simulation"), result)
 
     assert "fabric/error" not in textile_scenes.measure(roll_out(1.0))
     flat, shrunk = roll_out(1.0), roll_out(0.9)

@@ -74,17 +74,20 @@ def order_table(rows: pd.DataFrame) -> pd.DataFrame:
     for method in tests["drape"]["method"].unique():
         line = {"method": method, "time [ms]": means["drape"].get((method, "cost/frame"))}
         line |= {f"{t}_error [{UNITS[t]}]": means[t].get((method, "fabric/error")) for t in TESTS}
-        line["worst"] = None
+        worst = None
         for test, of_test in tests.items():
             readings = of_test[of_test["metric"] == TESTS[test]].pivot(
                 index="scene", columns="method", values="value"
             )
-            turned, pairs = order(readings[method].dropna(), readings["simulation"].dropna(), APART[test])
+            one, reference = (
+                readings.get(m, pd.Series(dtype=float)).dropna() for m in (method, "simulation")
+            )
+            turned, pairs = order(one, reference, APART[test])
             line[f"{test}_turned"] = f"{len(turned)} of {pairs}"
             if turned:
                 low, high = (scene.split("/", 2)[2] for scene in turned[0])
-                line["worst"] = f"{low} above {high} ({test})"
-        lines.append(line | {"worst": line.pop("worst")})
+                worst = f"{low} above {high} ({test})"
+        lines.append(line | {"worst": worst})
     return pd.DataFrame(lines)
 
 
@@ -147,7 +150,7 @@ def markdown(table: pd.DataFrame) -> str:
 
 
 if __name__ == "__main__":
-    rows = pd.read_csv(Path(sys.argv[1]) / "results.csv", low_memory=False)
+    rows = pd.read_csv(next(Path(sys.argv[1]).glob("results.csv*")), low_memory=False)
     made = tables(rows)
     for name, table in made.items():
         print(f"{name}\n\n{markdown(table)}\n")

@@ -51,6 +51,9 @@ FILES = {  # a file: what is wrong with it
     "import numpy\n" + METRIC_FILE.replace("float(", "numpy.float32("): "",  # as a run takes it
     METRIC_FILE + JUDGED + "('diverged', 'lost')": "",
     METRIC_FILE + JUDGED + "'lost'": "ValueError: judge() gives 'lost': expected None, or a status",
+    METRIC_FILE + JUDGED + "('skipped', 'x')": "judge() gives ('skipped', 'x'): expected None",
+    METRIC_FILE + JUDGED + "('ok', '')": "judge() gives ('ok', ''): expected None",
+    METRIC_FILE.replace("float(", "exec('raise MemoryError(7)') or ("): ": wrong\n  MemoryError: 7",
     METRIC_FILE.replace("float(", "float('nan') * ("): "height/highest is not finite: leave it out",
     ARRAY.replace(".max())", ".max(axis=1)"): "TypeError: height/highest is array(",
 }
@@ -82,6 +85,7 @@ def test_a_method_is_checked_in_three_scenes_and_one_that_is_bound_to_a_mesh_whe
     assert check.main([file(METHOD.replace("self.scene, _ =", f"{bound}; self.scene, _ ="))]) == 1
     out = capsys.readouterr().out
     assert out.count("bound to 49 vertices") == 3 and "still in tshirt/kick: wrong" in out
+    assert check.main([file(METHOD), "--set", "sizes=smoke"]) == 2
 
 
 @pytest.mark.parametrize(("factor", "fine"), [(1.0, True), (0.999, False)])

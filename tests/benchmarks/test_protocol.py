@@ -64,8 +64,8 @@ def _scenes() -> dict[str, Any]:
         },
         "worn": settings_of(body, find_template("tshirt").tailor(body, vertices=preset.garment_vertices)),
         "garments": {
-            name: {"vertices": signature(made.tailor).parameters["vertices"].default, **made.measures}
-            for name, made in templates.items()
+            name: {"vertices": signature(template.tailor).parameters["vertices"].default, **template.measures}
+            for name, template in templates.items()
         },
         "built": {
             name: (
@@ -101,12 +101,12 @@ def _materials() -> dict[str, Any]:
 def _motions() -> dict[str, Any]:
     """Roles, and the content of every motion of the library; of whole recorded clips their frozen digests."""
     roles = ("TRAIN", "VALIDATION", "TEST", "DYNAMIC_VALIDATION", "DYNAMIC_TEST")
-    made = (library.make_motion(name) for name in library.LIBRARY if name not in library.CLIPS)
+    clips = (library.make_motion(name) for name in library.LIBRARY if name not in library.CLIPS)
     return {
         "roles": {role.lower(): getattr(library, role) for role in roles},
         "clips": {name: clip.digest for name, clip in library.CLIPS.items()},
         "segments": {name: list(segment) for name, segment in library.SEGMENTS.items()},
-        "made": {m.name: (_rounded(m.poses), _rounded(m.translations), m.fps) for m in made},
+        "made": {m.name: (_rounded(m.poses), _rounded(m.translations), m.fps) for m in clips},
     }
 
 

@@ -125,13 +125,9 @@ def test_digests_tell_values_apart():
 
     one = Pair(np.arange(3.0), "x")
     assert digest(one) == digest(Pair(np.arange(3.0), "x"))
-    others = [
-        Pair(np.arange(3.0) + 1e-16, "x"),
-        Pair(np.arange(3.0), "y"),
-        Pair(np.arange(3), "x"),
-        Pair(np.arange(3.0)[:, None], "x"),
-    ]
-    assert len({digest(value) for value in (one, *others)}) == 5
+    others = (np.arange(3.0) + 1e-16, np.arange(3), np.arange(3.0)[:, None])
+    pairs = [Pair(np.arange(3.0), "y"), *(Pair(array, "x") for array in others)]
+    assert len({digest(value) for value in (one, *pairs)}) == 5
     with pytest.raises(TypeError, match="object"):
         digest({"a": object()})
 
@@ -142,8 +138,8 @@ def test_a_commit_is_that_of_the_code_and_changes_are_those_of_code(tmp_path, mo
 
     def git(*words: str) -> str:
         command = ["git", "-c", "user.name=a", "-c", "user.email=a@b", *words]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
-        return done.stdout.strip()
+        process = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True)
+        return process.stdout.strip()
 
     def commit() -> str:
         provenance.commit.cache_clear()
@@ -161,6 +157,8 @@ def test_a_commit_is_that_of_the_code_and_changes_are_those_of_code(tmp_path, mo
         assert commit() == names[-1]
     write(tmp_path, "reports/build.py", "2")
     assert commit() == names[-1]
-    write(tmp_path, "snug/network.py", "2")
+    write(tmp_path, "snug/new/NOTICE.md", "2")
+    assert commit() == names[-1]
+    write(tmp_path, "snug/new/network.py", "2")
     assert commit() == f"{names[-1]}+changes"
     provenance.commit.cache_clear()

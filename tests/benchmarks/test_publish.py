@@ -56,16 +56,16 @@ def test_what_is_published_is_replaced_whole_or_left(tmp_path):
     keep(whole, target, Show(pictures=("lead",), networks=("pbns",)))
     published = RunFolder(target)
     assert published.read_rows() == rows and rows[0].moved == (("twin", 0.3333),)
-    assert not published.find_changes({"results.csv": digest_of_file(whole / "results.csv")})
-    kept = [
-        "energies.csv",
-        "lead.png",
-        "pbns-seed0.safetensors",
-        "report.pdf",
-        "results.csv.gz",
-        "run.json",
-    ]
-    assert sorted(path.name for path in target.rglob("*.*")) == kept
+    digests = {"results.csv": digest_of_file(whole / "results.csv")}
+    assert not published.find_changes(digests)
+    copy = target / "results.csv.gz"
+    for damaged in (copy.read_bytes()[:-9], b"\x1f\x8b\x08" + bytes(60), b"no gzip"):
+        copy.write_bytes(damaged)
+        assert published.find_changes(digests) == {"results.csv": "damaged"}
+        with pytest.raises(ResultsError, match=r"results\.csv: line"):
+            published.read_rows()
+    files = "energies.csv lead.png pbns-seed0.safetensors report.pdf results.csv.gz run.json"
+    assert sorted(path.name for path in target.rglob("*.*")) == files.split()
     assert [path.name for path in target.parent.iterdir()] == ["run"]
     rounded = TrainedModel.load(target / "models/pbns-seed0.safetensors")
     assert rounded.origin == network.origin
@@ -99,8 +99,8 @@ def test_a_run_counts_where_it_ended_and_simulations_stalled_at_worst(
     """benchmarks.run ends with status 1 for a stalled simulation, whose numbers count."""
     folder, reason = RunFolder(tmp_path), "why" * (status != "ok")
     assert not all_usable(folder)  # no rows yet
-    what = ("garments", "tshirt/kick", "simulation", 0, "energy/total", "J")
-    folder.write_rows([Row(*what, status=status, reason=reason, value=1.0)])
+    key = ("garments", "tshirt/kick", "simulation", 0, "energy/total", "J")
+    folder.write_rows([Row(*key, status=status, reason=reason, value=1.0)])
     folder.write_config({"finished": finished} | more)
     assert all_usable(folder) == usable
 

@@ -80,6 +80,8 @@ def test_a_scored_roll_out_has_the_rows_of_the_run_it_comes_from(made, tmp_path,
     )
     assert (again["name"], again["scene"], again["status"]) == ("mine", "hanging_sheet", "ok")
     assert again["metrics"]["energy/strain"] == {"value": expected["energy/strain"], "unit": "J"}
+    assert score.main([f"mine={mine}", *SCENE, "-o", str(folder.path)]) == 2
+    assert "holds a run of another command" in capsys.readouterr().err
 
 
 def test_without_a_reference_the_reason_is_said(made, tmp_path):
@@ -112,21 +114,17 @@ def test_a_shipped_reference_gives_the_numbers_of_a_fresh_simulation(tmp_path, m
         assert shipped["metrics"][metric]["value"] == pytest.approx(
             number["value"], rel=1e-3, abs=1e-6
         ), metric
-    assert (
-        shipped["metrics"].keys() == fresh["metrics"].keys() >= {"gap/relative", "dynamics/common_gain"}
-    )
+    names = shipped["metrics"].keys()
+    assert names == fresh["metrics"].keys() >= {"gap/relative", "dynamics/common_gain"}
     assert numbers(RunFolder(tmp_path / "quick"), "skinning") == pytest.approx(
         numbers(RunFolder(tmp_path / "fresh"), "skinning"), rel=1e-3, abs=1e-6
     )
     longer = replace(study, sizes=replace(study.sizes, settle_frames=13))
-    assert (
-        score.score(tmp_path / "mine.npz", name, study=longer, folder=tmp_path / "other")["status"]
-        == "ok"
-    )
+    other = score.score(tmp_path / "mine.npz", name, study=longer, folder=tmp_path / "other")
+    assert other["status"] == "ok"
     error = capsys.readouterr().err  # what needs no simulation is kept
-    assert (
-        "none is shipped for this scene" in error and "quasi-static solutions: failed: TypeError" in error
-    )
+    assert "none is shipped for this scene" in error
+    assert "quasi-static solutions: failed: TypeError" in error
 
 
 @pytest.mark.slow  # minutes: a whole scene is simulated
@@ -172,9 +170,9 @@ def test_a_pickle_that_brings_its_own_body_needs_no_scene(tmp_path, capsys):
 
     def write(scale: float) -> None:
         obstacle = np.repeat(scene.obstacle.positions, scene.frames, axis=0)
-        held = {"pred": scale * trajectory.positions, "cloth_faces": trajectory.faces}
-        held |= {"obstacle": scale * obstacle, "obstacle_faces": scene.obstacle.faces}
-        pickled.write_bytes(pickle.dumps(held))
+        arrays = {"pred": scale * trajectory.positions, "cloth_faces": trajectory.faces}
+        arrays |= {"obstacle": scale * obstacle, "obstacle_faces": scene.obstacle.faces}
+        pickled.write_bytes(pickle.dumps(arrays))
         write_obj(rest, scale * scene.cloth.rest_positions, scene.cloth.faces)
 
     write(1.0)
@@ -188,11 +186,13 @@ def test_a_pickle_that_brings_its_own_body_needs_no_scene(tmp_path, capsys):
         name: value.value if isinstance(value, Estimate) else value for name, value in values.items()
     }
     assert metrics == expected and expected["energy/collision"] > 0.0 <= expected["penetration/vertices"]
-    # All of it in centimetres, and nobody says so: nothing in the file contradicts it but its size.
-    write(100.0)
-    assert score.main([*arguments, str(tmp_path / "no")]) == 2
-    error = capsys.readouterr().err.splitlines()[-1]
-    assert "m across in units=m: say units=cm" in error and not (tmp_path / "no").exists()
+    # All of it in another unit, and nobody says so: nothing in the file contradicts it but its size.
+    for scale, unit, hint in ((100.0, "m", "units=cm"), (1.0, "mm", "units=m")):
+        write(scale)
+        assert score.main([f"{pickled},units={unit}", *arguments[1:], str(tmp_path / "no")]) == 2
+        error = capsys.readouterr().err.splitlines()[-1]
+        assert f"m across in units={unit}: say " in error and hint in error
+    assert not (tmp_path / "no").exists()
 
 
 @pytest.mark.parametrize(

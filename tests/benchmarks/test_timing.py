@@ -53,9 +53,9 @@ def test_short_work_is_done_again_until_enough_is_measured_and_long_work_once():
 
 
 def test_most_memory_is_between_what_is_held_and_the_systems_count():
-    held = int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
+    memory = int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE") / 1e6
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1.024e-3
-    assert 0.9 * held <= peak_memory() <= 1.02 * most
+    assert 0.9 * memory <= peak_memory() <= 1.02 * most
 
 
 @pytest.mark.parametrize("always", [False, True])
@@ -76,10 +76,10 @@ def test_a_first_run_that_compiles_is_no_measurement(always):
 
 
 def test_an_answer_that_was_kept_from_the_first_run_is_found():
-    kept = np.zeros((2, 3, 3))
-    _, reading = time_run(lambda: kept[:], read=positions_of, min_time=1.0)
+    x = np.zeros((2, 3, 3))
+    _, reading = time_run(lambda: x[:], read=positions_of, min_time=1.0)
     assert "what it had given before" in reading.complaint and len(reading.runs) == 2
-    assert time_run(lambda: kept, read=positions_of)[1].complaint == ""
+    assert time_run(lambda: x, read=positions_of)[1].complaint == ""
 
 
 @pytest.mark.parametrize("pause", [0.0, 0.01])

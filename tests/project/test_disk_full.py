@@ -76,8 +76,8 @@ def test_a_run_stops_in_one_line_and_goes_on(tmp_path, monkeypatch, capsys):
     assert "simulation.vtkhdf: File too large" in line
     assert folder.read_config()["finished"] is None and not list(folder.path.rglob("*.part*"))
     assert run.main([*arguments, str(folder.path)]) == 0
-    rows, others = (
-        [(r.metric, r.value, r.status) for r in made.read_rows() if "cost/" not in r.metric]
-        for made in (folder, other)
+    rows, expected = (
+        [(r.metric, r.value, r.status) for r in place.read_rows() if "cost/" not in r.metric]
+        for place in (folder, other)
     )
-    assert rows == others
+    assert rows == expected

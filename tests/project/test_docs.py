@@ -84,9 +84,9 @@ def run(folder: Path, line: str) -> str:
     search_path = os.pathsep.join([str(Path(sys.executable).parent), os.environ.get("PATH", "")])
     environment = os.environ | {"PYTHONPATH": str(ROOT), "PATH": search_path, "MPLBACKEND": "Agg"}
     command = ["bash", "-ec", line]
-    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
-    assert done.returncode == 0, f"{line}\n{done.stdout[-2000:]}{done.stderr[-4000:]}"
-    return done.stdout
+    process = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True)
+    assert process.returncode == 0, f"{line}\n{process.stdout[-2000:]}{process.stderr[-4000:]}"
+    return process.stdout
 
 
 def judge(title: str, folder: Path) -> None:
@@ -96,8 +96,8 @@ def judge(title: str, folder: Path) -> None:
     assert rows and all(row["status"] == "ok" for row in rows)
 
     def values(metric: str, scene: str = "") -> dict[str, float]:
-        found = [row for row in rows if row["metric"] == metric and scene in ("", row["scene"])]
-        return {row["method"]: float(row["value"]) for row in found}
+        rows_found = [row for row in rows if row["metric"] == metric and scene in ("", row["scene"])]
+        return {row["method"]: float(row["value"]) for row in rows_found}
 
     if title == "A method":
         total = values("energy/total", "hanging_sheet")
@@ -132,9 +132,9 @@ def judge(title: str, folder: Path) -> None:
 @pytest.mark.parametrize("title", EXAMPLE_SECTIONS)
 def test_an_example_of_extending_runs_as_written(title, user, tmp_path):
     shells = [content for _, language, content in blocks(SECTIONS[title]) if language == "sh"]
-    *_, said = [run(user, content.replace("DIR", str(tmp_path)).rstrip()) for content in shells]
+    *_, output = [run(user, content.replace("DIR", str(tmp_path)).rstrip()) for content in shells]
     if title in LAST_WORDS:
-        assert said.endswith(LAST_WORDS[title])
+        assert output.endswith(LAST_WORDS[title])
     else:
         judge(title, tmp_path)
 

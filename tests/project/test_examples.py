@@ -18,8 +18,8 @@ FACES = [".".join(stub.parent.relative_to(ROOT).parts) for stub in STUBS]
 @pytest.mark.parametrize("module", EXAMPLES)
 def test_the_examples_of_a_module_give_what_they_say(module):
     loaded = importlib.import_module(module)
-    found = doctest.DocTestFinder().find(loaded)
-    assert any(test.examples for test in found)  # else numba's wrapper hides them
+    examples = doctest.DocTestFinder().find(loaded)
+    assert any(test.examples for test in examples)  # else numba's wrapper hides them
     assert doctest.testmod(loaded, optionflags=doctest.ELLIPSIS).failed == 0
 
 
@@ -27,6 +27,6 @@ def test_the_examples_of_a_module_give_what_they_say(module):
 def test_a_face_gives_what_it_names_and_its_functions_have_examples(face):
     package = importlib.import_module(face)
     public = [getattr(package, name) for name in package.__all__]
-    functions = [thing for thing in public if inspect.isfunction(thing)]
+    functions = [member for member in public if inspect.isfunction(member)]
     assert public
-    assert [thing.__name__ for thing in functions if ">>> " not in (thing.__doc__ or "")] == []
+    assert [member.__name__ for member in functions if ">>> " not in (member.__doc__ or "")] == []

@@ -93,8 +93,8 @@ def write_model(path: Path) -> None:
 
 
 def write_shirt(path: Path) -> None:
-    made = tailored("tshirt", 200)
-    write_obj(path, made.rest_positions, made.faces)
+    shirt = tailored("tshirt", 200)
+    write_obj(path, shirt.rest_positions, shirt.faces)
 
 
 def read_cloth(path: Path) -> None:

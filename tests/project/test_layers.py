@@ -94,7 +94,7 @@ def complaints(module: str, source: str) -> list[str]:
 @pytest.mark.parametrize("layer", LAYERS)
 def test_imports_follow_the_layers(layer):
     modules = modules_of(layer)
-    assert modules and [wrong for given in modules.items() for wrong in complaints(*given)] == []
+    assert modules and [wrong for module in modules.items() for wrong in complaints(*module)] == []
 
 
 @pytest.mark.parametrize(

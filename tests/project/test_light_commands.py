@@ -37,12 +37,12 @@ LIGHT = [
 
 @pytest.mark.parametrize(("command", "answer", "heavy"), LIGHT)
 def test_nothing_heavy_is_loaded_before_there_is_something_to_do(command, answer, heavy, tmp_path):
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-c", PROBE, *command.split()],
         capture_output=True, text=True, timeout=120, cwd=tmp_path, env=os.environ | {"PYTHONPATH": str(ROOT)},
     )  # fmt: skip
-    assert done.returncode == 0 and done.stderr == "", done.stderr
-    output, _, modules = done.stdout.rpartition("LOADED")
+    assert process.returncode == 0 and process.stderr == "", process.stderr
+    output, _, modules = process.stdout.rpartition("LOADED")
     loaded = set(modules.split())
     assert answer in output and "runpy" in loaded and loaded.isdisjoint(heavy), loaded & heavy
     assert list(tmp_path.iterdir()) == []

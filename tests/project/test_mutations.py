@@ -99,11 +99,11 @@ def run(copy: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
 def outcome(copy: Path, names: tuple[str, ...] = (), enough: int = ENOUGH) -> tuple[int, list[list[str]]]:
     """Run the checks in the copy; return how many ran, and those that failed with their reasons."""
     try:
-        done = run(copy, "-c", RUNNER, json.dumps(names), str(enough))
+        ended = run(copy, "-c", RUNNER, json.dumps(names), str(enough))
     except subprocess.TimeoutExpired:
         return 0, [["-", "no end within 300 s"]]
-    assert done.returncode == 0, done.stderr
-    ran, caught = json.loads(done.stdout.splitlines()[-1])
+    assert ended.returncode == 0, ended.stderr
+    ran, caught = json.loads(ended.stdout.splitlines()[-1])
     return ran, caught
 
 

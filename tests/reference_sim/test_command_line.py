@@ -42,7 +42,7 @@ def test_a_wrong_word_is_one_line_with_the_name_of_the_command(
             OSError(errno.ENOSPC, "No space left", "a.csv"),
             "--resume goes on",
             1,
-            "kept; --resume goes on",
+            "there); --resume goes on",
         ),
         (KeyboardInterrupt(), "--resume goes on", 130, "interrupted; --resume goes on"),
         (KeyboardInterrupt(), "", 130, "interrupted; nothing was written"),

@@ -69,7 +69,7 @@ def test_what_never_comes_within_the_margin_falls_freely(seed):
     obstacle, rest, faces, fall = case(seed)
     cloth = Cloth(rest, faces)
     terms = [StretchStVK(cloth), Gravity(cloth), ContactPenalty(cloth, margin=MARGIN)]
-    found = simulate(
+    result = simulate(
         cloth, terms, frames=FRAMES, obstacle=obstacle, start=fall[0], tolerance=1e-9
     ).positions
-    assert np.abs(found - fall).max() < 1e-6
+    assert np.abs(result - fall).max() < 1e-6

@@ -41,9 +41,9 @@ def simulate(tmp_path, monkeypatch):
 
 def test_a_sheet_falls_onto_a_moving_ball(simulate, capsys):
     assert simulate("sheet.obj --obstacle ball --obstacle-rest ball/0.obj -o out.vtkhdf") == 0
-    found = Trajectory.load("out.vtkhdf")
-    assert (found.status, found.frames) == ("converged", 3)
-    assert found.frame_fields["energy/collision"][-1] > 0 and "collision" in capsys.readouterr().out
+    result = Trajectory.load("out.vtkhdf")
+    assert (result.status, result.frames) == ("converged", 3)
+    assert result.frame_fields["energy/collision"][-1] > 0 and "collision" in capsys.readouterr().out
 
 
 def test_a_pinned_sheet_in_other_units_and_axes_is_the_same(simulate):
@@ -67,11 +67,11 @@ def test_triangles_apart_are_refused_and_hang_as_one_sheet_once_they_are_welded(
 
 
 def test_pins_ride_on_an_obstacle_that_moves_below_them_and_stay_elsewhere(simulate, capsys):
-    for pins, moved, said in (("24", 0.02, "1 ride on the obstacle"), ("0,6", 0.0, "2 stay in place")):
+    for pins, moved, message in (("24", 0.02, "1 ride on the obstacle"), ("0,6", 0.0, "2 stay in place")):
         assert simulate(f"sheet.obj --pins {pins} --obstacle ball -o at{pins}.vtkhdf") == 0
         x = Trajectory.load(f"at{pins}.vtkhdf").positions[:, [int(pin) for pin in pins.split(",")]]
         np.testing.assert_allclose(x[-1] - x[0], np.tile([moved, 0, 0], (x.shape[1], 1)), atol=1e-12)
-        assert f"pins       {said}" in capsys.readouterr().out
+        assert f"pins       {message}" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(
@@ -84,6 +84,7 @@ def test_pins_ride_on_an_obstacle_that_moves_below_them_and_stay_elsewhere(simul
         ("sheet.obj --obstacle-rest sheet.obj -o a.vtkhdf", "is a pose of an obstacle: add --obstacle"),
         ("sheet.obj --pins top -o a.vtkhdf", "--pins top: the mesh is level, all of it is its top"),
         ("sheet.obj --weld 0.5 -o a.vtkhdf", "makes a line of triangle 0: weld by less"),
+        ("sheet.obj --frames 1 -o a.vtkhdf", "frame 0 is the start: give 2 or more"),
         ("sheet.obj --weld 0 -o a.vtkhdf", "weld=0.0: give a distance above 0"),
         ("sheet.obj --weld nan -o a.vtkhdf", "weld=nan: give a distance above 0"),
     ],
@@ -103,5 +104,5 @@ def test_a_mesh_that_takes_more_memory_than_there_is_is_refused_at_once(simulate
 
 def test_an_import_of_the_command_leaves_the_function_where_it_is():
     code = "import reference_sim.simulate as a; from reference_sim import simulate as b; print(a is b, b)"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert done.stdout.startswith("True <function simulate at")
+    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert process.stdout.startswith("True <function simulate at")

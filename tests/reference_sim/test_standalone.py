@@ -45,9 +45,9 @@ def test_a_simulation_loads_no_more_than_it_needs_and_without_cvxopt_ends_at_the
     for absent in ((), ("cvxopt",)):
         path = tmp_path / f"{len(absent)}.vtkhdf"
         command = [sys.executable, "-c", SIMULATION, str(path), *absent]
-        done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
-        loaded = set(done.stdout.split())
+        process = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+        assert process.returncode == 0, process.stderr
+        loaded = set(process.stdout.split())
         assert {"numba", "h5py"} < loaded and loaded.isdisjoint((*absent, *UNNEEDED))
         results.append(Trajectory.load(path))
     first, other = (result.positions for result in results)

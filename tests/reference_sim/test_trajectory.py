@@ -44,7 +44,10 @@ def test_what_is_no_trajectory_is_named_with_its_path(tmp_path):
     (tmp_path / "text").write_text("not HDF5")
     with h5py.File(tmp_path / "other", "w") as file:
         file["numbers"] = [1, 2, 3]
-    for name, message in (("absent", "no such"), ("text", "not a VTKHDF"), ("other", "not a VTKHDF")):
+    replace(wave(2), times=np.zeros(1), provenance={"dt": np.float32(1)}).save(tmp_path / "short")
+    replace(wave(2), faces=FACES + 1).save(tmp_path / "faces")
+    for name in ("absent", "text", "other", "short", "faces"):
+        message = "no such" if name == "absent" else "not a VTKHDF"
         with pytest.raises(TrajectoryError, match=f"{name}: {message} trajectory"):
             Trajectory.load(tmp_path / name)
 

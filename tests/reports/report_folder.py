@@ -26,11 +26,11 @@ OF_CASES = ("check", "outcome")
 DECLARED = {entry.name: entry for entry in METHODS}  # any other is a network of its own
 
 
-def row(scene="tshirt/walk", method="snug", metric="energy/strain", value=1.0, *, seed=0, **more) -> Row:
+def row(scene="tshirt/walk", method="snug", metric="energy/strain", value=1.0, *, seed=0, **kw) -> Row:
     """A row with the columns that its scene and method declare."""
-    own = MethodEntry(name=method, description="", role="network", seeded=True,
+    network = MethodEntry(name=method, description="", role="network", seeded=True,
                       pairing_group=method)  # fmt: skip
-    entry = DECLARED.get(method, own)
+    entry = DECLARED.get(method, network)
     garment, _, motion = scene.partition("/")
     declared = {
         "role": entry.role, "family": entry.family or method, "base": entry.base,
@@ -38,8 +38,8 @@ def row(scene="tshirt/walk", method="snug", metric="energy/strain", value=1.0, *
         "pairing_group": entry.pairing_group,
         "garment": garment if motion else "", "motion": motion, "part": "whole" if motion else "",
     }  # fmt: skip
-    more = {"suite": "garments", "unit": "J", "hardware": "here", **declared, **more}
-    return Row(scene=scene, method=method, seed=seed, metric=metric, value=value, **more)
+    fields = {"suite": "garments", "unit": "J", "hardware": "here", **declared, **kw}
+    return Row(scene=scene, method=method, seed=seed, metric=metric, value=value, **fields)
 
 
 def skipped(reason="no body here", **more) -> Row:
@@ -111,18 +111,18 @@ def all_rows() -> list[Row]:
             failed = {"value": None, "status": "failed", "reason": "diverged at step 7"}
             rows.append(row(scene, "supervised", metric, **failed))
     for cut in (1, 4):
-        more = {"suite": "speed", "method": f"newton-{cut}"}
-        rows.append(row(SCENES[0], metric="cost/frame", unit="ms", value=2.0 * cut, **more))
-        rows.append(row(SCENES[0], metric="curvature/error", unit="1/m", value=3.0 / cut, **more))
-        rows.append(row(SCENES[0], metric="energy/total", value=1.5 - cut * 0.2, **more))
-        rows.append(row("hanging_sheet", metric="energy/strain", value=0.0, **more))
+        fields = {"suite": "speed", "method": f"newton-{cut}"}
+        rows.append(row(SCENES[0], metric="cost/frame", unit="ms", value=2.0 * cut, **fields))
+        rows.append(row(SCENES[0], metric="curvature/error", unit="1/m", value=3.0 / cut, **fields))
+        rows.append(row(SCENES[0], metric="energy/total", value=1.5 - cut * 0.2, **fields))
+        rows.append(row("hanging_sheet", metric="energy/strain", value=0.0, **fields))
     rows.append(row("free_fall", "simulation", "energy/gravity", -0.5, suite="speed"))
     rows.append(skipped(scene="hanging_sheet", suite="speed"))
     check = {"suite": "validation", "method": "simulation", "metric": "check", "unit": "m"}
     rows.append(row("falls_freely", value=1e-15, expected=0.0, tolerance=1e-12, **check))
     rows.append(row("zero_modes", value=6.0, expected=6.0, tolerance=0.0, **check))
-    more = {"status": "failed", "reason": "off", "expected": 0.28350664, "tolerance": 1e-4}
-    rows.append(row("sag", value=0.3, **check, **more))
+    fields = {"status": "failed", "reason": "off", "expected": 0.28350664, "tolerance": 1e-4}
+    rows.append(row("sag", value=0.3, **check, **fields))
     case = {"suite": "extremes", "method": "simulation", "metric": "outcome", "unit": "vertex weights"}
     rows.append(row("stiff", value=3e-7, **case))
     rows.append(row("teleport", value=None, status="timeout", reason="over 30 s", **case))

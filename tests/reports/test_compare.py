@@ -86,12 +86,12 @@ def fails(before: list[Row], after: list[Row]) -> bool:
 
 @pytest.mark.parametrize("name", PLANTED)
 def test_a_planted_regression_is_caught(name):
-    assert fails(a_run(0), [PLANTED[name](given) for given in a_run(1)])
+    assert fails(a_run(0), [PLANTED[name](a_row) for a_row in a_run(1)])
 
 
 @pytest.mark.parametrize("name", LOST)
 def test_what_is_gone_is_caught_and_named_once(name):
-    after = [given for given in a_run(1) if LOST[name](given)]
+    after = [a_row for a_row in a_run(1) if LOST[name](a_row)]
     lines = found(a_run(0), after)
     assert lines and {verdict for verdict, *_ in lines} == {"gone"} and len(lines) <= 3
     assert found(a_run(0), after, shared=True) == []
@@ -100,27 +100,27 @@ def test_what_is_gone_is_caught_and_named_once(name):
 def test_other_seeds_other_times_and_round_off_are_no_change():
     alarms = sum(fails(a_run(2 * k), a_run(2 * k + 1)) for k in range(6))
     assert alarms == 0
-    tiny = [times(1.0 - 1e-6, metric="energy/total")(given) for given in a_run(0)]
+    tiny = [times(1.0 - 1e-6, metric="energy/total")(a_row) for a_row in a_run(0)]
     assert not fails(a_run(0), tiny)
 
 
 def test_a_motion_on_which_seeds_disagree_hides_no_change_of_another():
     broken = {"scene": SCENES[6], "seed": 1} | STRAIN
-    before, after = ([times(40.0, **broken)(given) for given in a_run(draw)] for draw in (0, 1))
+    before, after = ([times(40.0, **broken)(a_row) for a_row in a_run(draw)] for draw in (0, 1))
     assert not fails(before, after)
-    assert fails(before, [times(3.0, scene=SCENES[0], **STRAIN)(given) for given in after])
+    assert fails(before, [times(3.0, scene=SCENES[0], **STRAIN)(a_row) for a_row in after])
 
 
 def test_what_the_uncertainty_or_2_percent_covers_is_no_change():
-    little, worse = ([times(factor, **SIMULATED)(given) for given in a_run()] for factor in (1.015, 1.1))
+    little, worse = ([times(factor, **SIMULATED)(a_row) for a_row in a_run()] for factor in (1.015, 1.1))
     assert found(a_run(), little) == []
     assert found(a_run(), worse) == [("worse", "tshirt", "simulation", "energy/strain")]
-    unsure, both = ([replace(r, uncertainty=0.5) for r in rows] for rows in (a_run(), worse))
-    assert found(unsure, both) == []
+    unsure, sure = ([replace(r, uncertainty=0.5) for r in rows] for rows in (a_run(), worse))
+    assert found(unsure, sure) == []
     unsure = [replace(r, uncertainty=0.3 * r.value) for r in a_run()]
-    assert found(unsure, [times(0.2, scene=SCENES[0], **SIMULATED)(given) for given in unsure]) == []
+    assert found(unsure, [times(0.2, scene=SCENES[0], **SIMULATED)(a_row) for a_row in unsure]) == []
     # The later run's own uncertainty hides nothing.
-    assert found(a_run(), both) == [("worse", "tshirt", "simulation", "energy/strain")]
+    assert found(a_run(), sure) == [("worse", "tshirt", "simulation", "energy/strain")]
 
 
 def test_of_thousands_of_answers_the_farthest_by_chance_is_no_change():
@@ -144,16 +144,16 @@ def test_a_correlation_of_the_other_sign_is_worse():
 
 
 def test_a_network_of_one_seed_is_judged_by_the_interval_of_the_seeds_of_the_earlier_run():
-    later = [given for given in a_run(1) if given.seed == 0]
+    later = [a_row for a_row in a_run(1) if a_row.seed == 0]
     assert not fails(a_run(0), [*later, *(r for r in a_run(1) if r.seed)])
     assert found(a_run(0), later, shared=True) == []
-    worse = found(a_run(0), [times(3.0, **STRAIN)(given) for given in later], shared=True)
+    worse = found(a_run(0), [times(3.0, **STRAIN)(a_row) for a_row in later], shared=True)
     assert {(verdict, *rest) for verdict, _, *rest in worse} == {("worse", "snug", "energy/strain")}
 
 
 def test_a_check_off_by_more_than_its_tolerance_is_worse_whatever_it_says():
-    for more in ({}, {"tolerance": 5e-3}):
-        later = [replace(r, value=0.284, **more) if r.scene == "sag" else r for r in a_run()]
+    for fields in ({}, {"tolerance": 5e-3}):
+        later = [replace(r, value=0.284, **fields) if r.scene == "sag" else r for r in a_run()]
         assert found(a_run(), later) == [("worse", "sag", "simulation", "check")]
         assert found(later, later) == []  # an engine that violates a law is a result
 
@@ -161,19 +161,19 @@ def test_a_check_off_by_more_than_its_tolerance_is_worse_whatever_it_says():
 @pytest.mark.parametrize(("spread", "factors"), [(3.0, (1.2, 1.3)), (12.0, (1.22, 1.6))])
 def test_a_repeated_time_is_compared_on_one_machine_with_the_range_of_its_repeats(spread, factors):
     before = [replace(r, value=spread) if r.metric == "cost/spread" else r for r in a_run()]
-    same, slower = ([times(factor, **TIME)(given) for given in before] for factor in factors)
+    same, slower = ([times(factor, **TIME)(a_row) for a_row in before] for factor in factors)
     assert found(before, same) == []
     assert found(before, slower) == [("worse", "flag", "lbfgs-5", "cost/frame")]
     assert found(before, slower, times=False) == []
-    assert found(before, [replace(given, hardware="another") for given in slower]) == []
+    assert found(before, [replace(a_row, hardware="another") for a_row in slower]) == []
 
 
 def test_cells_of_two_protocols_are_refused():
     """A cell beside another reference is a user's own, though other rows of its run are of one protocol."""
     frozen = [replace(r, protocol="1.0") for r in a_run()]
-    own = [replace(r, protocol="own") if r.scene == SCENES[2] else r for r in frozen]
+    rows = [replace(r, protocol="own") if r.scene == SCENES[2] else r for r in frozen]
     with pytest.raises(ResultsError, match=r"motion_2 x snug: of protocol 1\.0 in A, own in B"):
-        compare(run_of(frozen), run_of(own))
+        compare(run_of(frozen), run_of(rows))
 
 
 @pytest.mark.parametrize(
@@ -227,14 +227,18 @@ def test_a_cell_that_fails_and_a_check_that_is_off_are_worse():
         return replace(r, status="diverged", value=None, reason="step 7") if lost else r
 
     later = [ended(r) for r in a_run()]
-    both = [("worse", SCENES[0], "snug", "energy/strain"), ("worse", "sag", "simulation", "check")]
-    assert found(a_run(), later) == found(a_run(), later, metrics="penetration/*") == both
+    changes = [("worse", SCENES[0], "snug", "energy/strain"), ("worse", "sag", "simulation", "check")]
+    assert found(a_run(), later) == found(a_run(), later, metrics="penetration/*") == changes
     assert [verdict for verdict, *_ in found(later, a_run())] == ["better", "better"]
     assert found(a_run(), later, methods="lbfgs-*") == []
     # A cell without numbers has one row, of a time.
     sound = [r for r in a_run() if (r.scene, r.method, r.seed) != (SCENES[0], "snug", 1)]
     lone = row(SCENES[0], "snug", "cost/frame", None, seed=1, status="failed", reason="no end")
     assert [verdict for verdict, *_ in found([*sound, lone], a_run())] == ["better"]
+    for options in ({}, {"metrics": "penetration/*"}):
+        assert [verdict for verdict, *_ in found(a_run(), [*sound, lone], **options)] == ["worse"]
+    stalled = [replace(r, status="stalled") if r.scene == SCENES[0] else r for r in a_run()]
+    assert {verdict for verdict, *_ in found(stalled, [*sound, lone])} == {"gone", "better"}
 
 
 @pytest.mark.parametrize("fallen", [SCENES[:1], SCENES])
@@ -265,14 +269,14 @@ def test_a_network_that_nothing_judges_is_not_called_the_same(seeds, note, compa
 
 def test_run_times_are_of_the_scenes_in_which_solvers_were_timed_too():
     whole = [row(s, "snug", "cost/whole", x, unit="ms") for s, x in zip(SCENES, (9.0, 2.0))]
-    both = [row(SCENES[1], name, "cost/frame", 2.0, unit="ms") for name in ("snug", "lbfgs-5")]
-    run = run_of([*a_run(), *whole, *both])
+    rows = [row(SCENES[1], name, "cost/frame", 2.0, unit="ms") for name in ("snug", "lbfgs-5")]
+    run = run_of([*a_run(), *whole, *rows])
     assert compare(run, run, times=True).headline["snug"][-1] == "2.00 → 2.00 same"
 
 
 def test_exit_status_and_lines(tmp_path, capsys):
     run_folder(tmp_path / "a", a_run(0))
-    run_folder(tmp_path / "b", [times(1.3, **STRAIN)(given) for given in a_run(1)])
+    run_folder(tmp_path / "b", [times(1.3, **STRAIN)(a_row) for a_row in a_run(1)])
     one, worse = str(tmp_path / "a"), str(tmp_path / "b")
     assert command.main([one, one]) == 0 and "0 worse" in capsys.readouterr().out
     assert command.main([one, worse, "--metrics", "*"]) == 1
@@ -319,11 +323,11 @@ def test_bad_input_is_one_line_and_status_2(tmp_path, refused, b, options, says)
 
 def test_a_run_says_whether_it_agrees_with_the_published_one_of_its_study(tmp_path):
     run_folder(tmp_path / "mine", a_run(), study={"name": "mine"})
-    again = [given for given in a_run(1) if given.seed == 0]
+    again = [a_row for a_row in a_run(1) if a_row.seed == 0]
 
     def line(rows: list[Row], name: str = "mine") -> str:
         return command.compare_published(run_of(rows, study={"name": name}), tmp_path)
 
-    odd = [times(3.0, scene=SCENES[0], **STRAIN)(given) for given in again]
+    odd = [times(3.0, scene=SCENES[0], **STRAIN)(a_row) for a_row in again]
     assert line(again).startswith("published: reproduced (") and line(again, "other") == ""
     assert line(odd) == f"published: 1 numbers differ: SNUG in {SCENES[0]}"

@@ -36,9 +36,9 @@ def write_run(path, totals, scenes, protocol, **config):
 @pytest.fixture
 def published(tmp_path):
     motions = {"test tshirt": ["a", "b", "c"]}
-    more = {"motions": motions, "preset_values": {"test_motions": 2}}
+    fields = {"motions": motions, "preset_values": {"test_motions": 2}}
     scenes = (*FULL, "tshirt/c")
-    return write_run(tmp_path / "published", {"snug": 1.8}, scenes, "1.0", **more)
+    return write_run(tmp_path / "published", {"snug": 1.8}, scenes, "1.0", **fields)
 
 
 def write_entry(root, name, total, *, scenes=FULL, protocol="1.0"):
@@ -50,7 +50,7 @@ def write_entry(root, name, total, *, scenes=FULL, protocol="1.0"):
 
 
 def test_a_table_has_one_protocol_and_one_set_of_scenes_and_is_sorted(tmp_path, published):
-    made = [
+    files = [
         write_entry(tmp_path / "in", "worse", 3.0),
         write_entry(tmp_path / "in", "better", 1.08),
         write_entry(tmp_path / "in", "part", 1.0, scenes=FULL[:1]),
@@ -58,7 +58,7 @@ def test_a_table_has_one_protocol_and_one_set_of_scenes_and_is_sorted(tmp_path, 
         write_entry(tmp_path / "in", "fallen", {"tshirt/a": 1.0, "tshirt/b": -20.0}),
     ]
     assert full_scenes(published) == FULL
-    tables = [table for table, _ in entries_tables([*map(load_entry, made)], "quick", published)]
+    tables = [table for table, _ in entries_tables([*map(load_entry, files)], "quick", published)]
     assert {table.caption: [line[1].split()[0] for line in table.rows] for table in tables} == {
         "Protocol 0.9; scenes: all.": ["old"],
         "Protocol 1.0; scenes: all.": ["better", "SNUG", "worse", "Skinning", "fallen"],

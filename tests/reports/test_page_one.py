@@ -26,18 +26,18 @@ def said(topic: str, rows, **config) -> str:
 
 
 def test_the_sentences_of_page_one():
-    made = headline(run_of([*SNUG, *BESIDE, *PBNS]))
-    assert " ".join(f"{topic}: {text}" for topic, text in made).split() == SENTENCES.split()
+    table = headline(run_of([*SNUG, *BESIDE, *PBNS]))
+    assert " ".join(f"{topic}: {text}" for topic, text in table).split() == SENTENCES.split()
     assert headline(run_of(BESIDE[:2])) == []
 
 
 def test_the_verdict_is_of_the_first_garment_and_of_unseen_motions():
     rows = SNUG + BESIDE
-    more = [row("skirt/walk", name, "energy/total", 3.0) for name in ("snug", "simulation")]
+    others = [row("skirt/walk", name, "energy/total", 3.0) for name in ("snug", "simulation")]
     # A member of the reference's family is no rival, however near it is.
-    more += on_two_scenes(MEMBER, 0.5, 7.0)
+    others += on_two_scenes(MEMBER, 0.5, 7.0)
     named = said("Verdict", rows).replace("motion SNUG", "motion of the tshirt SNUG")
-    assert said("Verdict", rows + more) == named != said("Verdict", rows)
+    assert said("Verdict", rows + others) == named != said("Verdict", rows)
     for roles, words in {
         ("test", "training"): "one unseen", ("training", "training"): "a typical",
         ("validation", "validation"): "a typical validation", ("validation", ""): "a typical unseen",
@@ -61,8 +61,8 @@ def test_a_network_whose_garment_fell_off_is_named():
 def test_page_one_shows_the_network_the_papers_rival_or_another_and_a_baseline():
     run = run_of(all_rows())
     assert leads(run, run.garment_rows) == ["simulation", "snug", "pbns", "skinning"]
-    mine, own = on_two_scenes("mine", 3.0, 9.0), {"role": "external", "seeded": False}
-    mine = [dataclasses.replace(r, **own) for r in mine]
+    mine, fields = on_two_scenes("mine", 3.0, 9.0), {"role": "external", "seeded": False}
+    mine = [dataclasses.replace(r, **fields) for r in mine]
     alone = run_of([*BESIDE, *mine])
     assert leads(alone, alone.garment_rows) == ["simulation", "mine", "skinning"]
     times = [

@@ -55,10 +55,10 @@ def report(tmp_path_factory):
     run = run_folder(tmp_path_factory.mktemp("run"), rows, preset="smoke", **provenance)
     methods = {r.method for r in rows} & {*SHOWN, *HOSTILE}
     write_roll_outs(run, {r.scene for r in rows if r.garment}, methods)
-    read = read_run(run)
-    pictures = draw_figures(read, run.figures, FIGURES)
-    write_pdf(run, Report(read, make_tables(read), pictures))
-    assert not read.problems
+    results = read_run(run)
+    pictures = draw_figures(results, run.figures, FIGURES)
+    write_pdf(run, Report(results, make_tables(results), pictures))
+    assert not results.problems
     document = pdfium.PdfDocument(run.report_path)
     yield document
     document.close()

@@ -45,6 +45,7 @@ def test_the_still_has_what_came_to_its_end_at_the_liveliest_frame(run):
 def test_the_worst_frame_is_where_the_network_lies_farthest_above_the_reference(run):
     totals = {"simulation": [5, 1, 0], "snug": [6, 4, 1]}
     lines = [(SCENE, name, 0, t / 30, e) for name in totals for t, e in enumerate(totals[name])]
+    lines.insert(0, (SCENE, "snug", 1, 2 / 30, 99))  # of a seed that the picture does not show
     frames = pd.DataFrame(lines, columns=["scene", "method", "seed", "seconds", "total"])
     caption = worst_frame(replace(read_run(run), frame_energies=frames)).caption
     assert "frame 1, where SNUG has most energy above the reference, 3 J" in caption
@@ -79,14 +80,14 @@ def test_a_gif_has_every_second_frame_in_its_time_and_the_same_bytes_twice(run, 
     assert paths[0].read_bytes() == paths[1].read_bytes()
     with Image.open(paths[0]) as picture:
         assert picture.n_frames == 3 and picture.width == 200
-        shown, lasted = [], 0.0
+        images, lasted = [], 0.0
         for frame in range(picture.n_frames):
             picture.seek(frame)
             lasted += picture.info["duration"]
-            shown.append(np.asarray(picture.convert("RGB")).astype(int))
+            images.append(np.asarray(picture.convert("RGB")).astype(int))
     assert lasted == pytest.approx(6 / 30 * 1000, abs=10)
     rows = slice(30, -30)  # without names and time
-    half = [(picture[rows, :100], picture[rows, 100:]) for picture in shown]
+    half = [(picture[rows, :100], picture[rows, 100:]) for picture in images]
     assert np.abs(half[0][0] - half[0][1]).max() < 40  # both at rest, one light, one camera
     assert np.abs(half[2][0] - half[2][1]).max() > 100
 
@@ -122,8 +123,9 @@ def test_a_roll_out_that_ended_early_says_so_and_keeps_its_last_frame(run):
     assert np.array_equal(cloth.positions[-1], pictures.freeze(cloth, 4, (0.0, 0.0, 0.0)).positions)
 
 
-def test_point_caches_of_garment_and_body_have_their_meshes_beside_them(run, tmp_path):
+def test_point_caches_of_garment_and_body_have_their_meshes_beside_them(run, tmp_path, capsys):
     assert filmed(run, tmp_path / "x.pc2", "--methods", "snug") == 0
+    assert set(capsys.readouterr().out.split()) == {str(path) for path in tmp_path.iterdir()}
     assert {path.name for path in tmp_path.iterdir()} == {
         f"x_{name}.{ending}" for name in ("snug", "body") for ending in ("pc2", "obj")
     }
@@ -159,6 +161,8 @@ def test_all_cloths_are_in_sight_of_one_camera_in_every_frame():
         (["--scene", "tshirt-walk"], "in tshirt-walk: scenes with roll-outs are tshirt/walk"),
         (["-o", "x.avi"], "x.avi: a film ends in .gif, a picture in .png"),
         (["--width", "7"], "--width is 64 to 2000"),
+        (["--azimuth", "nan"], "--azimuth is a finite number"),
+        (["--seed", "-3", "--methods", "snug"], "'snug' in tshirt/walk, seed -3: roll-outs there are"),
     ],
 )
 def test_what_cannot_be_filmed_is_one_line_and_status_2(

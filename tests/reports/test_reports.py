@@ -119,8 +119,22 @@ def test_curves_beside_a_trajectory_are_its_own(tmp_path):
     fields = read_run(run).roll_outs.cloth(SCENES[0], "snug", 0).frame_fields
     assert fields["energy/strain"].tolist() == fields["iterations"].tolist() == [1.0] * FRAMES
     run.curves_path(SCENES[0], "snug").write_bytes(b"no archive")
-    read = read_run(run)
-    assert read.roll_outs.cloth(SCENES[0], "snug", 0) is None and "snug.npz" in read.problems[0]
+    results = read_run(run)
+    assert results.roll_outs.cloth(SCENES[0], "snug", 0) is None and "snug.npz" in results.problems[0]
+
+
+@pytest.mark.parametrize(
+    ("role", "config", "says"),
+    [
+        ("boss", {}, "role 'boss' is none of reference"),
+        ("", {"metrics": {"energy/total": {"of": "time"}}}, "of='time'"),
+        ("", {"metrics": ["energy/total"]}, "run.json: does not fit"),
+        ("", {"scenes": ["tshirt/walk"]}, "run.json: does not fit"),
+    ],
+)
+def test_a_run_whose_files_do_not_fit_is_refused_by_name(tmp_path, refused, role, config, says):
+    run = run_folder(tmp_path, [row(metric="energy/total", role=role)], **config)
+    assert str(run.config_path) in refused(says, build.main, [str(tmp_path)])
 
 
 def test_a_broken_copy_of_frame_energies_is_refused_and_scenes_without_rows_are_left_out(tmp_path):
@@ -129,6 +143,8 @@ def test_a_broken_copy_of_frame_energies_is_refused_and_scenes_without_rows_are_
     whole = gzip.compress("\n".join(["scene,method,seed,seconds,strain", *lines]).encode())
     path.write_bytes(whole)
     assert energy_series(read_run(run)).name == "energy_series_tshirt-jump"
+    run.write_rows([row("tshirt/jump", value=None, status="failed", reason="no end")])
+    assert energy_series(read_run(run)) is None
     path.write_bytes(whole[:-40])
     with pytest.raises(ResultsError, match=r"csv\.gz: not readable"):
         read_run(run)

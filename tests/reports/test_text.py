@@ -8,9 +8,8 @@ from dataclasses import replace
 import pandas as pd
 import pytest
 
-from benchmarks.declarations import attributes_of
 from benchmarks.external.roll_out_files import KEYS
-from benchmarks.results.row import COLUMNS, Row
+from benchmarks.results.row import Row
 from benchmarks.results.run_folder import RunFolder
 from reports.build import build_row
 from reports.docs import documents, main
@@ -19,7 +18,7 @@ from reports.statistics.means_and_spreads import Mean
 from reports.tables.table import METHOD, REMARKS, Column, Table
 from reports.text.for_your_paper import latex, write_paper_table
 from reports.text.published_parts import BEGIN, END, docstring_rows, fill, published_part
-from reports.text.text_table import text_rows
+from reports.text.text_table import remarks_on, text_rows
 from snug.body.smpl_files import SYNONYMS
 from snug.motion.files import ARRAY_NAMES
 from tests.reports.report_folder import row, run_folder, run_of
@@ -40,10 +39,7 @@ def test_an_interval_has_a_column_of_its_own_and_empty_columns_are_left_out():
     assert head == ["Method", "Excess [%]", "Interval", "Total [J]"]
     assert snug[0] == "SNUG" and " to " in snug[2] and "±" not in snug[3] and snug[3] == "0.250"
     assert skinning == ["skinning", "–", "–", "–"]
-
-
-def test_the_docstring_of_rows_has_each_of_their_columns_once():
-    assert sorted(name for names in attributes_of(Row) for name in names.split(", ")) == sorted(COLUMNS)
+    assert remarks_on([["*"], ["1.5*†"], ["2"]]) == f"{REMARKS['*']} {REMARKS['†']}"
 
 
 @pytest.mark.parametrize(
@@ -79,6 +75,10 @@ def test_a_part_without_an_end_and_a_part_of_no_form_are_refused():
         fill(BEGIN.format("front of quick"), lambda request: "")
     with pytest.raises(ValueError, match="known: docstring"):
         published_part("everything of quick")
+    with pytest.raises(ValueError, match="'front of' names nothing"):
+        published_part("front of")
+    with pytest.raises(ImportError, match="nope"):
+        published_part("docstring of snug.nope")
     for request in (
         "table nothing of quick", "table overview of quick; colour", "metrics of benchmarks; colour",
         "table overview of quick, paper_text; method; snug, nobody",
@@ -91,16 +91,16 @@ def test_a_part_without_an_end_and_a_part_of_no_form_are_refused():
 HOSTILE = r"50% off_{a} & #1 [b] ~^ \x"
 
 
-def rows_for_a_paper(**more) -> list[Row]:
+def rows_for_a_paper(**fields) -> list[Row]:
     """Rows of five motions and two seeds of SNUG between simulation and skinning, each with its numbers."""
     energy = {"simulation": 1.0, "skinning": 11.0, "snug": 2.0}
     rows = [
-        row(f"tshirt/m{k}", name, "energy/total", value * (k + 1) ** (0.1 * seed), seed=seed, **more)
+        row(f"tshirt/m{k}", name, "energy/total", value * (k + 1) ** (0.1 * seed), seed=seed, **fields)
         for k in range(5) for name, value in energy.items() for seed in range(1 + (name == "snug"))
     ]  # fmt: skip
-    more |= {"unit": "%", "method": "snug"}
-    rows += [row(f"tshirt/m{k}", metric="penetration/surface", value=0.5 + k, **more) for k in range(5)]
-    return [*rows, row("tshirt/m0", metric="cost/frame", value=0.25, **more | {"unit": "ms"})]
+    fields |= {"unit": "%", "method": "snug"}
+    rows += [row(f"tshirt/m{k}", metric="penetration/surface", value=0.5 + k, **fields) for k in range(5)]
+    return [*rows, row("tshirt/m0", metric="cost/frame", value=0.25, **fields | {"unit": "ms"})]
 
 
 def test_the_table_for_a_paper_has_intervals_counts_protocol_and_columns_of_the_run_alone(tmp_path):

@@ -9,6 +9,7 @@ import subprocess
 import sys
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,10 +25,11 @@ from benchmarks.metrics.curvature import curvature_series
 from benchmarks.metrics.energy import energy_series
 from benchmarks.runner.measurements import measure_roll_out
 from benchmarks.scene import Dressed
+from benchmarks.scenes import find_scene
 from reference_sim import Trajectory
 from reference_sim.files.mesh_files import read_mesh
 from snug.networks.dressed_body import DressedBody
-from tests.benchmarks.runner.tasks_by_hand import assets_of, dressed_scene, prepared
+from tests.benchmarks.runner.tasks_by_hand import assets_of, dressed_scene, prepared, small_scene
 from tests.snug.training.dressing import swaying, tube_dress
 
 SLOW = partial(pytest.param, marks=pytest.mark.slow)
@@ -57,8 +59,8 @@ def arrays(path: Path) -> dict[str, np.ndarray]:
 
 def skinned_elsewhere(folder: Path) -> np.ndarray:
     """Linear blend skinning from the exported files alone."""
-    given, moved = arrays(folder / "skinning.npz"), arrays(folder / "motion_smpl.npz")
-    joints, parents = given["joints"], given["parents"]
+    inputs, moved = arrays(folder / "skinning.npz"), arrays(folder / "motion_smpl.npz")
+    joints, parents = inputs["joints"], inputs["parents"]
     frames = len(moved["poses"])
     vectors = moved["poses"].reshape(frames, -1, 1, 3)
     local = expm(np.cross(np.eye(3), vectors))  # the matrix exponential turns them into rotations
@@ -69,9 +71,9 @@ def skinned_elsewhere(folder: Path) -> np.ndarray:
         else:
             world[:, j] = world[:, parent] @ local[:, j]
             at[:, j] = at[:, parent] + world[:, parent] @ (joints[j] - joints[parent])
-    offsets = given["rest_positions"][:, None] - joints  # (V,24,3)
+    offsets = inputs["rest_positions"][:, None] - joints  # (V,24,3)
     placed = np.einsum("tjab,vjb->tvja", world, offsets) + at[:, None]
-    return np.einsum("vj,tvja->tva", given["smoothed_weights"], placed)
+    return np.einsum("vj,tvja->tva", inputs["smoothed_weights"], placed)
 
 
 def rows_beside(scene, entry) -> dict:
@@ -81,11 +83,9 @@ def rows_beside(scene, entry) -> dict:
     group = SceneRollOuts(scene)
     group.quasi_static = expected_positions(scene)
     fall = Trajectory(group.quasi_static + 0.01, trajectory.faces, trajectory.times)
-    held = None if still is None else still.positions
-    for one, made, static_answer in ((find_method("simulation"), fall, None), (entry, trajectory, held)):
-        group.roll_outs.append(
-            RollOut(group, one, made, suites=("garments",), quasi_static=static_answer)
-        )
+    static = None if still is None else still.positions
+    for one, roll, answer in ((find_method("simulation"), fall, None), (entry, trajectory, static)):
+        group.roll_outs.append(RollOut(group, one, roll, suites=("garments",), quasi_static=answer))
     return {
         name: value
         for name, value in measure_roll_out(group.roll_outs[1])[0].items()
@@ -111,9 +111,9 @@ def test_skinning_made_elsewhere_and_scored_gives_the_numbers_of_the_method(home
     # The very positions of the method, by way of a file: to the last digit.
     assert rows_of_file(positions=inside, fps=30.0, quasi_static=inside) == expected
     # Without its answer to poses held still, what needs that is left out and nothing else.
-    less = rows_of_file(positions=inside)
-    assert {name.partition("/")[0] for name in expected.keys() - less.keys()} <= {"dynamics"}
-    assert "dynamics/quasi_static_difference" not in less and less.items() <= expected.items()
+    rows = rows_of_file(positions=inside)
+    assert {name.partition("/")[0] for name in expected.keys() - rows.keys()} <= {"dynamics"}
+    assert "dynamics/quasi_static_difference" not in rows and rows.items() <= expected.items()
 
 
 TENSORFLOW = """
@@ -148,10 +148,10 @@ saved_model = SimpleNamespace(load=load)
 
 def test_the_authors_network_is_given_what_it_reads_in_its_order(home, tmp_path):
     folder, _ = home
-    given, motion = arrays(folder / "skinning.npz"), arrays(folder / "motion_smpl.npz")
+    inputs, motion = arrays(folder / "skinning.npz"), arrays(folder / "motion_smpl.npz")
     body = (1, *arrays(folder / "obstacle.npz")["positions"].shape[1:])
     (tmp_path / "tensorflow.py").write_text(TENSORFLOW.replace("BODY", str(body)))
-    np.savez(tmp_path / "cloth.npz", weights=given["smoothed_weights"], rest=given["rest_positions"])
+    np.savez(tmp_path / "cloth.npz", weights=inputs["smoothed_weights"], rest=inputs["rest_positions"])
     script = Path(__file__).parents[3] / "docs" / "examples" / "authors_snug.py"
     command = [sys.executable, str(script), str(tmp_path), str(folder), str(tmp_path / "out.npz")]
     subprocess.run(command, check=True, env=os.environ | {"PYTHONPATH": str(tmp_path)})
@@ -165,12 +165,12 @@ def test_the_authors_network_is_given_what_it_reads_in_its_order(home, tmp_path)
 def test_what_is_exported_is_the_scene(home, tmp_path):
     folder, scene = home
     cloth, rest = arrays(folder / "cloth.npz"), read_mesh(folder / "rest.obj")
-    for written, own in (
+    for written, value in (
         (cloth["start_positions"], scene.start), (cloth["masses"], scene.cloth.masses),
         (arrays(folder / "obstacle.npz")["positions"], scene.obstacle.positions),
         (rest.positions, scene.cloth.rest_positions), (rest.faces, scene.cloth.faces),
     ):  # fmt: skip
-        assert np.array_equal(written, own)
+        assert np.array_equal(written, value)
     facts = json.loads((folder / "scene.json").read_text())
     assert facts["material"]["young_modulus"] == 70e3
     assert facts["energies"]["collision"]["margin_m"] == 0.004
@@ -222,6 +222,10 @@ def test_scenes_without_a_body_are_exported_too(tmp_path, capsys):
     cloth = arrays(tmp_path / "flag" / "cloth.npz")
     assert cloth["pin_positions"].shape == (10, 7, 3) and len(cloth["pins"]) == 7
     assert not (tmp_path / "flag" / "obstacle.npz").exists()
+    flag, torn = small_scene("flag"), SimpleNamespace(frames=3, status="diverged", reason="torn")
+    method = SimpleNamespace(prepare=lambda scene: None, run=lambda: torn)
+    with pytest.raises(RuntimeError, match="flag: diverged: torn"):
+        write_scene(tmp_path / "torn", find_scene("flag"), flag, preset="smoke", simulation=method)
     reference = Trajectory.load(tmp_path / "flag" / "reference.vtkhdf")
     assert np.array_equal(arrays(tmp_path / "flag" / "reference.npz")["positions"], reference.positions)
     assert export.main(["flag", "--set", "sizes=smoke", "-o", str(tmp_path / "flag")]) == 2
@@ -234,9 +238,9 @@ def test_of_a_part_of_a_motion_the_frames_before_it_are_exported(tmp_path):
     tube, motion = tube_dress(), swaying(20)
     part, before = motion.cut(8, 20), motion.cut(0, 8)
     write_motion(tmp_path, Dressed(tube.body, tube.garment, part, before=before))
-    held = arrays(tmp_path / "motion_smpl.npz")
-    whole = np.concatenate([held["poses_before"], held["poses"]])
+    clip = arrays(tmp_path / "motion_smpl.npz")
+    whole = np.concatenate([clip["poses_before"], clip["poses"]])
     assert np.array_equal(whole, motion.poses.reshape(20, -1))
-    assert np.array_equal(np.concatenate([held["trans_before"], held["trans"]]), motion.translations)
+    assert np.array_equal(np.concatenate([clip["trans_before"], clip["trans"]]), motion.translations)
     write_motion(tmp_path, Dressed(tube.body, tube.garment, motion))
     assert "poses_before" not in arrays(tmp_path / "motion_smpl.npz")

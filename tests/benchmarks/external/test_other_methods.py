@@ -60,13 +60,13 @@ def test_graph_networks_read_body_and_garment_and_their_answer_is_scored(home, s
     assert "lame_lambda_override 44392.1" in text and "density_override 0.20022," in text
     # What valid_rollout returns (runners/from_any_pose.py:96), written by pickle_dump.
     answer = skinned[0].astype(np.float32)
-    given = {
+    fields = {
         "pred": answer,
         "obstacle": position.transpose(1, 0, 2),
         "metrics": {"time": 1.5, "loss": [0.0]},
     }
-    given |= {"cloth_faces": cloth["faces"], "obstacle_faces": faces}
-    (tmp_path / "output_m.pkl").write_bytes(pickle.dumps(given))
+    fields |= {"cloth_faces": cloth["faces"], "obstacle_faces": faces}
+    (tmp_path / "output_m.pkl").write_bytes(pickle.dumps(fields))
     check_rows(tmp_path / "output_m.pkl", home, skinned)
 
 

@@ -136,8 +136,8 @@ WRONG = {
 @pytest.mark.parametrize("name", WRONG)
 def test_what_does_not_belong_to_the_scene_is_refused_with_the_remedy(name, tmp_path):
     positions, faces, stated, remedy = WRONG[name]
-    given = {} if faces is None else {"faces": faces}
-    np.savez(tmp_path / "mine.npz", positions=positions, **given)
+    fields = {} if faces is None else {"faces": faces}
+    np.savez(tmp_path / "mine.npz", positions=positions, **fields)
     with pytest.raises(RollOutFileError, match=remedy) as refused:
         rows(str(tmp_path / "mine.npz"), **stated)
     assert str(refused.value).count("mine.npz") == 1 and "\n" not in str(refused.value)
@@ -158,11 +158,10 @@ def test_a_roll_out_that_explodes_is_a_result_and_one_of_another_motion_is_not(m
     carried = SCENE.start + way
     monkeypatch.setattr(roll_out_files, "expected_positions", lambda scene: carried)
     late = carried.copy()
-    late[5:] = np.inf
-    roll_out_files.fit_to_scene(StoredRollOut(late), SCENE)
-    with pytest.raises(
-        RollOutFileError, match=r"from frame 1 on its centre lies .* where the body carries"
-    ):
+    for frame, value in ((5, np.inf), (2, np.nan)):
+        late[frame:] = value
+        roll_out_files.fit_to_scene(StoredRollOut(late), SCENE)
+    with pytest.raises(RollOutFileError, match=r"from frame 1 on its centre lies .* the body carries"):
         roll_out_files.fit_to_scene(StoredRollOut(SCENE.start - way), SCENE)
 
 
@@ -194,6 +193,8 @@ def test_an_option_says_everything_of_a_roll_out():
         ("mine", "NAME=FILE"),
         ("m=a.npz,units=inch", "choose from m, cm, mm"),
         ("m=a.npz,ms=0", "positive"),
+        ("body=a.npz", "is 'body' or ends in 'quasi-static': give another, as mine=FILE"),
+        ("x-quasi-static=a.npz", "ends in 'quasi-static'"),
     ],
 )
 def test_a_wrong_option_is_one_line(text, hint):

@@ -198,8 +198,8 @@ def test_a_run_that_is_done_again_gives_the_same_and_inputs_are_what_it_takes_as
     assert np.array_equal(first, again)
     assert np.array_equal(first, trajectory_of(run, BODY, name).positions)
     last = scene.frames - 1
-    made = method.inputs(scene)(last)
-    pose, body = made if "+" in name else (made, made)
+    fields = method.inputs(scene)(last)
+    pose, body = fields if "+" in name else (fields, fields)
     if name not in ("skinning", "snug"):
         assert np.abs(body[0] - scene.obstacle.positions[last]).max() < 1e-12
     if name.startswith(("skinning", "snug")):
@@ -215,8 +215,8 @@ def test_energies_of_judged_frames_are_kept_of_references_baselines_and_networks
     run_folder.write_frame_energies(folder, rows)
     table = run_folder.read_frame_energies(folder.frame_energies_path)
     assert list(table) == ["scene", "method", "seed", "seconds", *scene.terms, "total"]
-    kept = {entry.name for entry in CHOSEN if entry.role in ("reference", "baseline", "network")}
-    assert set(table["method"]) == kept and set(table["scene"]) == {BODY}
+    names = {entry.name for entry in CHOSEN if entry.role in ("reference", "baseline", "network")}
+    assert set(table["method"]) == names and set(table["scene"]) == {BODY}
     means = {(r.method, r.metric): r.value for r in rows if (r.suite, r.scene) == ("garments", BODY)}
     for method, lines in table.groupby("method"):
         judged = scene.dt * np.arange(scene.warm_up, scene.frames)

@@ -89,9 +89,9 @@ def test_the_reference_is_where_another_solver_ends_from_another_start(name):
         potential.prepare(Step(previous, velocity, guess, scene.dt, scene.obstacle, frame))
         noise = np.random.default_rng(frame).normal(0, 1e-3, x.shape) * scene.cloth.free[:, None]
         reached = VertexBlockDescent(potential, max_iterations=1500).minimise(x + noise)
-        here, to_gain = potential.value(x), potential.value(guess) - potential.value(x)
-        assert potential.value(x + noise) - here > 0.1 * to_gain > 0
-        assert abs(reached.energy - here) < 1e-6 * to_gain
+        energy, to_gain = potential.value(x), potential.value(guess) - potential.value(x)
+        assert potential.value(x + noise) - energy > 0.1 * to_gain > 0
+        assert abs(reached.energy - energy) < 1e-6 * to_gain
         assert np.abs(reached.positions - x).max() < 1e-5
 
 
@@ -115,12 +115,6 @@ def test_xpbd_finds_the_minimum_where_its_constraints_are_linear_and_nearly_else
     reached = [XPBD(potential, max_iterations=n).minimise(guess).energy for n in (10, 100, 3000)]
     gaps = [(energy - best) / to_gain for energy in reached]
     assert gaps[0] > gaps[1] > gaps[2] and 1e-6 < gaps[2] < 0.2
-
-
-def test_a_contact_without_stiffness_pushes_nothing_in_xpbd():
-    potential, guess = pressed(cells=4)
-    next(term for term in potential.energies if term.name == "collision").stiffness[:] = 0.0
-    assert np.isfinite(XPBD(potential, max_iterations=2).minimise(guess).positions).all()
 
 
 @pytest.mark.parametrize("method", [VertexBlockDescent, XPBD])

@@ -66,12 +66,12 @@ def test_a_warm_started_solver_begins_its_frames_and_residuals_anew(solver, monk
 
     def method() -> WarmStarted:
         cut_short = {"method": solver, "max_iterations": 2}
-        made = WarmStarted(options={}, guess="skinning", path=tmp_path, solver=cut_short, residual=True)
-        monkeypatch.setattr(made, "_frames", lambda scene: frames)
+        method = WarmStarted(options={}, guess="skinning", path=tmp_path, solver=cut_short, residual=True)
+        monkeypatch.setattr(method, "_frames", lambda scene: frames)
         as_it_is = SimpleNamespace(carry=lambda residual, frame: residual)
-        monkeypatch.setattr(made, "_carry", lambda scene: as_it_is)
-        made.prepare(scene)
-        return made
+        monkeypatch.setattr(method, "_carry", lambda scene: as_it_is)
+        method.prepare(scene)
+        return method
 
     served = method()
     assert_sets_nothing_up(served, monkeypatch)

@@ -52,8 +52,8 @@ def test_a_ribbon_without_interior_vertices_has_no_curvature():
     faces = np.array([t for n in range(0, 8, 2) for t in ((n, n + 1, n + 2), (n + 1, n + 3, n + 2))])
     scene = SimpleNamespace(cloth=SimpleNamespace(faces=faces), warm_up=0)
     group = SceneRollOuts(scene)
-    both = [RollOut(group, SimpleNamespace(), Trajectory(x, faces, np.zeros(1))) for _ in range(2)]
-    assert measure(both[0]) == {} and compare(*both) == {}
+    roll_outs = [RollOut(group, SimpleNamespace(), Trajectory(x, faces, np.zeros(1))) for _ in range(2)]
+    assert measure(roll_outs[0]) == {} and compare(*roll_outs) == {}
 
 
 def test_curvature_of_a_plane_is_zero_and_noise_gives_the_published_floor():
@@ -87,8 +87,8 @@ def test_claims_on_wrinkles_see_their_depth_and_number_and_the_vertex_wise_error
     changed = waves(phase=np.pi / 2.0), waves(depth=0.001), waves(number=0.5)  # moved, less deep, fewer
     judges = {"curvature/histogram": histogram_distance, "curvature/error": curvature_error}
     (judge,) = judges.keys() & {claim.metric for claim in CLAIMS}
-    moved, *others = (judges[judge](one, still)[0] / still.means()[0] for one in changed)
-    assert moved < 0.05 and min(others) > 0.4
+    moved, *errors = (judges[judge](one, still)[0] / still.means()[0] for one in changed)
+    assert moved < 0.05 and min(errors) > 0.4
     assert min(curvature_error(one, still)[0] for one in changed) > 0.4 * still.means()[0]
     assert curvature_error(still, still)[0] == 0.0
     assert curvature_error(waves(depth=0.0), still)[0] == pytest.approx(still.means()[0], rel=1e-9)
@@ -102,5 +102,5 @@ def test_change_of_wrinkles_is_the_part_of_all_deviations_that_is_in_time():
     assert curvature_change(CurvatureSeries(h, area)) == pytest.approx(4.0 / 6.0)
     flat = CurvatureSeries(np.zeros((2, 4)), area)
     assert curvature_change(flat) is None
-    kept = CurvatureSeries(np.repeat(h[:1], 2, axis=0), area)
-    assert curvature_change(kept) == 0.0
+    series = CurvatureSeries(np.repeat(h[:1], 2, axis=0), area)
+    assert curvature_change(series) == 0.0

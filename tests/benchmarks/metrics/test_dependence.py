@@ -33,8 +33,8 @@ def test_each_mesh_and_time_step_is_measured_the_same_way(assets):
     value = {}
     for name in SCENES:
         scene = built(name, assets)
-        made = {method: prepared(method, scene).run().positions for method in METHODS}
-        for roll_out in grouped(scene, made, suites=("validation",)).roll_outs:
+        positions = {method: prepared(method, scene).run().positions for method in METHODS}
+        for roll_out in grouped(scene, positions, suites=("validation",)).roll_outs:
             metrics = measure_roll_out(roll_out, find_scene(name).metrics)[0]
             value |= {(name, roll_out.entry.name, metric): number for metric, number in metrics.items()}
     for name in SCENES:

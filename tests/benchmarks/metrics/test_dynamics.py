@@ -115,9 +115,9 @@ def test_a_share_of_the_dynamics_is_that_share_of_the_amplitude():
 
 def test_solvers_of_the_references_potential_alone_share_its_quasi_static_solution():
     shared = ("simulation", "simulation-1e-8", "simulation-dt/2", "newton-1", "fast-lbfgs-10", "xpbd-10")
-    own = ("simulation-springs", "snug+lbfgs-1", "ncs")
+    names = ("simulation-springs", "snug+lbfgs-1", "ncs")
     assert all(dynamics.shares_quasi_static(find_method(name)) for name in shared)
-    assert not any(dynamics.shares_quasi_static(find_method(name)) for name in own)
+    assert not any(dynamics.shares_quasi_static(find_method(name)) for name in names)
     assert not dynamics.shares_quasi_static(MethodEntry(name="mine", description="of a user"))
 
 

@@ -51,12 +51,12 @@ class DenseStep:
         self.free = np.setdiff1d(np.arange(len(rest)), pins)
 
     def _hinges(self) -> tuple[torch.Tensor, torch.Tensor]:
-        seen: dict[tuple[int, int], list[int]] = {}
+        pairs: dict[tuple[int, int], list[int]] = {}
         for number, face in enumerate(self.faces.tolist()):
             for i, j in itertools.combinations(sorted(face), 2):
-                seen.setdefault((i, j), []).append(number)
+                pairs.setdefault((i, j), []).append(number)
         rows, scale = [], []
-        for (i, j), pair in seen.items():
+        for (i, j), pair in pairs.items():
             if len(pair) == 2:
                 tips = [next(v for v in self.faces[n].tolist() if v not in (i, j)) for n in pair]
                 rows.append([i, j, *tips])
@@ -207,10 +207,10 @@ def test_frames_are_sampled_evenly_and_until_the_mean_is_known(monkeypatch):
     scene = small_scene("hanging_sheet", cells=4)
     x = simulated(scene, frames=40, method="newton", max_iterations=1).positions
     few, whole = (optimality(scene, x, samples=samples) for samples in (4, 99))
-    known, asked = few.metrics()["gap/energy"], whole.metrics()["gap/energy"]
+    value, asked = few.metrics()["gap/energy"], whole.metrics()["gap/energy"]
     assert 4 <= len(few.values["gap/energy"]) <= len(whole.values["gap/energy"]) == 38
-    assert known.uncertainty <= module.PRECISION * known.value
-    assert abs(known.value - asked.value) <= 4 * known.uncertainty
+    assert value.uncertainty <= module.PRECISION * value.value
+    assert abs(value.value - asked.value) <= 4 * value.uncertainty
     monkeypatch.setattr(module, "PRECISION", 10.0)
     rough = optimality(scene, x, samples=4)
     assert len(rough.values["gap/energy"]) == 4
@@ -230,12 +230,12 @@ def test_the_gap_is_taken_to_the_lowest_minimum_found_and_distances_to_the_one_b
     crumpled = folded + 1e-4 * np.random.default_rng(1).standard_normal(folded.shape)
     crumpled[scene.cloth.pins] = scene.start[scene.cloth.pins]
     low, below = minimise(potential, guess).energy, minimise(potential, crumpled, "lbfgs")
-    here = potential.value(crumpled)
+    crumpled_energy = potential.value(crumpled)
     # Several minima: the one reached from the frame itself is near, and not the best.
-    assert here - low > 2.0 * (here - below.energy) > 0.0
+    assert crumpled_energy - low > 2.0 * (crumpled_energy - below.energy) > 0.0
     metrics = optimality(scene, np.array([scene.start, scene.start, crumpled]), samples=1).metrics()
-    assert metrics["gap/energy"].value == pytest.approx(here - low, rel=1e-6)
-    assert metrics["gap/local"].value == pytest.approx(here - below.energy, rel=1e-9)
+    assert metrics["gap/energy"].value == pytest.approx(crumpled_energy - low, rel=1e-6)
+    assert metrics["gap/local"].value == pytest.approx(crumpled_energy - below.energy, rel=1e-9)
     apart = 1e3 * np.sqrt(((crumpled - below.positions) ** 2).sum(1).mean())
     assert metrics["step/distance"].value == pytest.approx(apart, rel=1e-9)
 

@@ -107,10 +107,10 @@ def test_histogram_distance_is_the_shift_of_a_distribution_and_blind_to_places()
     assert histogram_distance(shuffled, still) == pytest.approx(0, abs=1e-12)
     assert histogram_distance(CurvatureSeries(h + 2.5, area), still) == pytest.approx([2.5, 2.5])
     # Two heaps against one between them: all of the area moves by 3.
-    two = CurvatureSeries(np.array([[1.0, 7.0]]), np.array([[2.0, 2.0]]))
+    frame = CurvatureSeries(np.array([[1.0, 7.0]]), np.array([[2.0, 2.0]]))
     weights = np.array([[0.3, 0.0]])  # a boundary vertex weighs nothing
     one = CurvatureSeries(np.array([[4.0, 99.0]]), weights)
-    assert histogram_distance(two, one) == pytest.approx([3.0])
+    assert histogram_distance(frame, one) == pytest.approx([3.0])
     assert histogram_distance(CurvatureSeries(h, 0 * area), still) == pytest.approx([0.0, 0.0])
 
 
@@ -118,16 +118,16 @@ def test_intersections_are_those_of_two_crossing_strips():
     plane, faces = right_grid(6, 6, 1.0, 1.0)
     flat = np.column_stack([plane, 0.0 * plane[:, 0]])
     upright = np.column_stack([0.0 * plane[:, 0], plane]) + np.array([0.47, 0.013, -0.47])
-    both = np.concatenate([faces, faces + len(flat)])
+    doubled = np.concatenate([faces, faces + len(flat)])
     above = np.concatenate([flat, flat + np.array([0.0, 0.0, 0.01])])
     same = np.concatenate([flat, flat])
     for apart in (above, same):
-        hit, length = self_intersections(apart, both)
+        hit, length = self_intersections(apart, doubled)
         assert not hit.any() and length == 0.0
     crossing = np.concatenate([flat, upright])
     corners = flat[faces]
     through = (corners[:, :, 0].min(1) < 0.47) & (corners[:, :, 0].max(1) > 0.47)
-    hit, length = self_intersections(crossing, both)
+    hit, length = self_intersections(crossing, doubled)
     assert np.array_equal(hit[: len(faces)], through) and hit[len(faces) :].sum() == through.sum()
     # The plate that stands cuts the flat one from y = 0.013 to its edge.
     assert length == pytest.approx(1.0 - 0.013, rel=1e-12)

@@ -34,11 +34,11 @@ def scene():
 def simulations(scene):
     """Name -> positions of the reference, "at rest" its quasi-static twin, and of own references."""
     names = ("simulation", *(entry.name for entry in OWN_REFERENCES))
-    found = {name: prepared(name, scene).run().positions for name in names}
+    x = {name: prepared(name, scene).run().positions for name in names}
     at_rest = Simulation(AT_REST)
     at_rest.prepare(scene)
-    found["at rest"] = at_rest.run().positions
-    return found
+    x["at rest"] = at_rest.run().positions
+    return x
 
 
 def excess(scene, simulations, name, positions):

@@ -105,7 +105,7 @@ def test_means_are_over_the_judged_frames_alone():
     late = x.copy()
     late[-1] += 0.1 * np.random.default_rng(0).normal(size=x[0].shape)
     last = grouped(scene, {"simulation": x, "newton-1": late}).roll_outs[1]
-    strains = [energy.measure_energy(made)["energy/strain"] for made in (one, last)]
+    strains = [energy.measure_energy(r)["energy/strain"] for r in (one, last)]
     assert strains[1] > 2.0 * strains[0]
     # What ended in the warm-up has no number.
     ended = grouped(scene, {"newton-1": x[:3]}, suites=("garments",)).roll_outs[0]

@@ -29,8 +29,8 @@ def test_a_cell_in_two_parts_is_run_once():
     assert {cell.suites for cell in cells if cell.scene.part == "clip"} == {("speed",)}
     assert {cell.suites for cell in cells if cell.scene.name == "tshirt/kick"} == {("garments",)}
     study = study_with("full:garments,speed", scenes="tshirt/kick", methods="simulation")
-    both = {name: replace(part, scenes=("tshirt/{motion}",)) for name, part in study.parts.items()}
-    (cell,) = make_plan(replace(study, parts=both, test_motions=("kick",))).cells
+    parts = {name: replace(part, scenes=("tshirt/{motion}",)) for name, part in study.parts.items()}
+    (cell,) = make_plan(replace(study, parts=parts, test_motions=("kick",))).cells
     assert cell.suites == ("garments", "speed")
 
 
@@ -67,12 +67,29 @@ def test_patterns_choose_scenes_methods_and_cases():
     assert matching(["w1", "w[1]"], ["w[1]"]) == ["w1", "w[1]"] and matching(["a"], []) == []
 
 
+def test_patterns_that_take_names_out_bring_none_in():
+    def met(*words: str) -> set[tuple[str, str]]:
+        plan = planned("full:garments,speed,validation", *TESTS, *words)
+        return {
+            *((cell.scene.name, cell.method) for cell in plan.cells),
+            *((c.name, "") for c in plan.cases),
+        }
+
+    usual = met()
+    fewer = {(s, m) for s, m in usual if not (s.endswith("@clip") or s == "pendulum" or "newton" in m)}
+    assert met("--scenes", "!*@clip,!pendulum", "--methods", "!newton*") == fewer != usual
+    assert met("--scenes", "tshirt/*,!*@clip") < usual
+
+
 def test_places_of_a_pattern_are_filled_by_motions_of_the_split():
     motions = Motions(("walk",), ("kick", "punch"), garments=GARMENT_SCENES[:3])
     names = expand(["{garment}/{motion}", "tunic/{motion}", "tshirt/{motion 2}@clip", "flag"], motions)
     swinging = [f"tunic/{motion}" for motion in DYNAMIC_TEST]
     assert names == ["tshirt/kick", "tshirt/punch", *swinging, "tshirt/punch@clip", "flag"]
-    assert expand(["skirt/{swinging 1}", "skirt/{swinging 9}"], motions) == [f"skirt/{DYNAMIC_TEST[0]}"]
+    assert expand(["skirt/{swinging 1}"], motions) == [f"skirt/{DYNAMIC_TEST[0]}"]
+    for place in ("{motion 0}", "{swinging 9}"):
+        with pytest.raises(StudyError, match=f"skirt/{place}: there are 2 such motions, counted from 1"):
+            expand([f"skirt/{place}"], motions)
 
 
 @pytest.mark.parametrize(
@@ -117,9 +134,9 @@ def test_motions_are_divided_as_help_says():
     assert (len(small.train), len(small.measured)) == (SMOKE.train_motions, SMOKE.test_motions)
 
     clips = "abc"
-    files, both, single = divided(clips), divided(clips, motions="library"), divided("a")
+    files, mixed, single = divided(clips), divided(clips, motions="library"), divided("a")
     assert (files.train, files.test) == (("b", "c"), ("a",))
-    assert both.train == ("a", "b", "c", *TRAIN) and both.measured == TEST[:8]
+    assert mixed.train == ("a", "b", "c", *TRAIN) and mixed.measured == TEST[:8]
     assert (single.train, single.test) == (TRAIN, ("a",))
     roles = divided(clips, test_motions="b", validation_motions=["a", "c"])  # none is left to train on
     assert (roles.train, roles.validation, roles.test) == (TRAIN, ("a", "c"), ("b",))

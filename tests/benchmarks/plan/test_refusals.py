@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks import run
+from benchmarks import __main__, run
+from benchmarks.runner.execute_plan import check_methods
 from tests.benchmarks.plan.outside_files import METHOD, METRIC_FILE, SCENE_FILE, as_before
+from tests.benchmarks.plan.planned import planned
 
 _as_before = pytest.fixture(autouse=True)(as_before)
 
@@ -21,6 +23,7 @@ FIELDS = [  # study.toml -> line, field, and what is near it
     ("[parts.garmnts]", "line 1: parts.garmnts: no part is called so; choose from garments, "),
     ("[parts.speed]\nscenes = ['flagg']", "line 2: parts.speed.scenes: unknown scene 'flagg'"),
     ("garment = { units = 'cm' }", "study.toml: line 1: garment: path is absent: give it"),
+    ("like = 'folder/../study.toml'", "study.toml: is like itself"),
     ("garment = { path = 'tshirt.obj' }", "the project has scenes of that name: give the file another"),
 ]
 WORDS = [
@@ -29,7 +32,11 @@ WORDS = [
     ("latin.toml:garments", "latin.toml: not readable as TOML"),
     ("--set sizes.frames=2", "sizes.frames: 2: give 3 or more"),
     ("--set sizes.test_motions=-1", "sizes.test_motions: -1: give 1 or more"),
-    ("--set sizes.steps.snug=0", "sizes.steps.snug: 0: give 1 or more"),
+    ("--set=sizes.steps.snug=0", "sizes.steps.snug: 0: give 1 or more"),
+    ("--set sizes.steps.snugg=1", "sizes.steps.snugg: no training is called so; did you mean snug"),
+    ("--set sizes.warm_up_frames=-1", "sizes.warm_up_frames: -1: give 0 or more"),
+    ("--set sizes.least_seconds=nan", "sizes.least_seconds: nan: give a number above 0"),
+    ("--rollout a=b.npz --rollout a=c.npz", "--rollout: a, a: give each its own name"),
     ("--motions back.npz,up=z --motions walk.npz", "words behind a path hold for all files"),
     ("--scenes tshirt/walk", "see test_motions"),
     ("--methods sung", "did you mean snug"),
@@ -129,3 +136,13 @@ def test_a_file_that_cannot_be_meant_is_one_line(text, message, folder, refused)
 def test_what_a_scene_names_and_nobody_knows_is_one_line(fields, message, folder, refused):
     (folder / "named.py").write_text(SCENE_FILE.replace('sizes=("sheet_frames",)', fields))
     refused(message, run.main, ["--scenes", "named.py", "-o", "out"])
+
+
+def test_a_scene_that_raises_is_left_to_its_own_task(folder):
+    (folder / "named.py").write_text(SCENE_FILE.replace("Cloth(", "gone("))
+    (folder / "mine.py").write_text(METHOD)
+    assert check_methods(planned("--scenes", "named.py", "--methods", "mine.py")) is None
+
+
+def test_an_unknown_command_is_named(refused):
+    refused("benchmarks: no command 'scor': choose from score", __main__.main, ["scor"])

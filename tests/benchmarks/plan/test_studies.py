@@ -9,12 +9,13 @@ from pathlib import Path
 import pytest
 
 from benchmarks import run
-from benchmarks.plan.study import locate, parse_setting, read_study, study_names
+from benchmarks.plan.study import locate, option, parse_setting, read_study, study_names
 from benchmarks.presets import find_preset
 from reports.blocks import FIGURES
+from snug.file_options import GarmentFile
 from tests.benchmarks.plan.planned import planned
 
-MINE = """question = "Does it fall?"
+MINE = """question = "Does it fall, mine.py"
 like = "smoke"
 body = "mine.npz"
 motions = ["clips", "library"]
@@ -44,7 +45,7 @@ def mine(tmp_path) -> Path:
 
 def test_a_study_has_its_own_fields_those_that_it_is_like_and_paths_beside_its_file(mine):
     study = read_study(str(mine))
-    assert study == read_study(str(mine / "study.toml")) and study.question == "Does it fall?"
+    assert study == read_study(str(mine / "study.toml")) and study.question == "Does it fall, mine.py"
     assert study.body == mine / "mine.npz" and study.motions == (str(mine / "clips"), "library")
     assert study.metrics == (str(mine / "height.py"),)
     assert study.parts["speed"].methods == ("simulation", str(mine / "mine.py"))
@@ -68,6 +69,10 @@ def test_options_hold_before_the_file_and_their_paths_are_relative_to_where_one_
     assert (study.sizes.frames, study.sizes.name, study.garment.units) == (9, "quick", "cm")
     assert study.body == Path("b.npz") and study.garment.path == mine / "shirt.obj"
     assert list(study.parts) == ["speed"]
+    again = [option("garment", {"path": "b.obj"}), option("rollouts", {"others": {"path": "b.pc2"}})]
+    study = read_study(str(mine), [*again, parse_setting("sizes=smoke")])
+    assert study.garment == GarmentFile(path="b.obj") and study.sizes == find_preset("smoke")
+    assert study.rollouts["others"].units == "m" and study.rollouts["theirs"].path.endswith("}.npz")
 
 
 @pytest.mark.parametrize("name", study_names())
@@ -91,9 +96,9 @@ def test_the_list_is_a_screen_with_the_studys_scenes_and_a_word_gives_names_that
 
 def test_published_pictures_are_those_that_reports_draw():
     patterns = [f"{figure.name}*" for figure in FIGURES]
-    shown = [show for name in study_names() if (show := read_study(name).show)]
-    assert len(shown) >= 10
-    for picture in (picture for show in shown for picture in show.pictures):
+    shows = [show for name in study_names() if (show := read_study(name).show)]
+    assert len(shows) >= 10
+    for picture in (picture for show in shows for picture in show.pictures):
         assert any(fnmatch(f"{picture}.png", pattern) for pattern in patterns), picture
 
 

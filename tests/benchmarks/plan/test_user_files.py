@@ -73,10 +73,10 @@ def command(files: Path, *more: str) -> int:
 
 @pytest.fixture(scope="module")
 def done(files) -> RunFolder:
-    with contextmanager(as_before)(), redirect_stdout(StringIO()) as shown:
+    with contextmanager(as_before)(), redirect_stdout(StringIO()) as output:
         assert command(files) == 1  # one of the methods is broken
-    assert shown.getvalue().count(f"  {(files / 'out').resolve()}/") == 3  # page, PDF, rows
-    (film,) = (line for line in shown.getvalue().splitlines() if line.startswith("film  "))
+    assert output.getvalue().count(f"  {(files / 'out').resolve()}/") == 3  # page, PDF, rows
+    (film,) = (line for line in output.getvalue().splitlines() if line.startswith("film  "))
     assert "reports.film out --scene lift --methods " in film and "skinning" not in film
     return RunFolder(files / "out")
 
@@ -141,6 +141,10 @@ from benchmarks import known_answer
 def share(of):
     '''Return the share.'''
     return 1.0 / of
+
+@known_answer("all", expected=1.0, tolerance=0.1, reason="by hand")
+def whole():
+    return 1.0
 """
 STUDY = """
 [parts.answers]
@@ -155,7 +159,8 @@ def test_a_study_brings_known_answers_of_its_own(tmp_path):
     out = tmp_path / "out"
     assert run.main([str(tmp_path), "-o", str(out)]) == 1  # one of the two is wrong
     rows = {row.scene: row for row in RunFolder(out).read_rows()}
-    assert {name: row.status for name, row in rows.items()} == {"half": "ok", "third": "failed"}
+    statuses = {"half": "ok", "third": "failed", "all": "ok"}
+    assert {name: row.status for name, row in rows.items()} == statuses
     assert rows["half"].suite == "answers" and rows["third"].value == pytest.approx(1 / 3)
     assert "half,1,0.5,0.5,0.1" in (RunFolder(out).tables / "validation.csv").read_text()
 

@@ -107,16 +107,16 @@ def outcome_of(plan: Plan, number: int = 0, *, processes: bool = False) -> Outco
 def prepared(method: str | MethodEntry, scene: BuiltScene, models: Path = Path()) -> Method:
     """The method, by its name or entry, ready to run."""
     entry = find_method(method) if isinstance(method, str) else method
-    made = entry.make(models=models, seed=0)
-    made.prepare(scene)
-    return made
+    runner = entry.make(models=models, seed=0)
+    runner.prepare(scene)
+    return runner
 
 
 def simulated(scene: BuiltScene, **options) -> Trajectory:
     """The scene as `simulate` has it, from its start on, with these options in place of the scene's."""
-    given = {"dt": scene.dt, "frames": scene.frames, "obstacle": scene.obstacle, "start": scene.start}
-    given |= {"velocity": scene.start_velocity, "pin_positions": scene.pin_positions}
-    return simulate(scene.cloth, scene.energies, **given | options)
+    terms = {"dt": scene.dt, "frames": scene.frames, "obstacle": scene.obstacle, "start": scene.start}
+    terms |= {"velocity": scene.start_velocity, "pin_positions": scene.pin_positions}
+    return simulate(scene.cloth, scene.energies, **terms | options)
 
 
 def trajectory_of(scene: BuiltScene, positions: np.ndarray, **fields) -> Trajectory:

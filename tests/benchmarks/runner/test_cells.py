@@ -19,8 +19,8 @@ from tests.benchmarks.runner.tasks_by_hand import TINY, InProcess, finish, outco
 def why(plan: Plan, kind: str = "cell", number: int = 0) -> str:
     """Return why a cell, or what follows it, has to be run; "finished" where it has not."""
     runner = Runner(tasks_of(plan), Cache(RunFolder(plan.folder), retry=plan.retry))
-    found = {task.id: why for task, why, _ in runner.preview()}
-    return found[kind, plan.cells[number].name] or "finished"
+    reasons = {task.id: why for task, why, _ in runner.preview()}
+    return reasons[kind, plan.cells[number].name] or "finished"
 
 
 def rows(runner: Runner, plan: Plan) -> dict[str, Row]:
@@ -80,8 +80,8 @@ def test_a_finished_cell_is_reused_until_something_that_it_uses_changes(tmp_path
     assert again.reused == [f"cell {plan.cells[0].label}"] and why(plan) == "finished"
     finer = plan_of(tmp_path, "simulation", preset=dataclasses.replace(TINY, sheet_cells=4))
     assert why(finer) == "stale: scene"
-    others = dataclasses.replace(TINY, garment_vertices=99, gap_samples=9)
-    assert why(plan_of(tmp_path, "simulation", preset=others)) == "finished"
+    sizes = dataclasses.replace(TINY, garment_vertices=99, gap_samples=9)
+    assert why(plan_of(tmp_path, "simulation", preset=sizes)) == "finished"
 
 
 def test_a_cell_that_is_run_again_leaves_nothing_of_its_earlier_run(tmp_path):

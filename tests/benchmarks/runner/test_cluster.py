@@ -118,10 +118,10 @@ def test_killed_at_random_moments_the_files_are_the_same(tmp_path, workers):
                 time.sleep(chance.uniform(0.0, 0.6))
                 if not runner.is_alive():
                     break
-                kept = {path: path.read_bytes() for path in folder.glob("cache/**/*.json")}
+                contents = {path: path.read_bytes() for path in folder.glob("cache/**/*.json")}
                 kill_one(chance, cluster, runner, int(begun.read_text().split()[-1]))
                 kills += 1
-                assert {path: path.read_bytes() for path in kept} == kept
+                assert {path: path.read_bytes() for path in contents} == contents
             runner.join(120)
             if files(folder) == expected:  # begin again: there are kills left
                 for path in folder.rglob("*.json"):

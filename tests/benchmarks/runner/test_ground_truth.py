@@ -93,8 +93,8 @@ def test_parts_are_all_clips_once_and_what_is_not_whole_is_left_out(tmp_path, qu
     assert [o.result["clips"] for o in outcomes] == [["mixed_1"], [], [], ["mixed_4", "mixed_5"]]
     left_out = {name: why for o in outcomes for name, why in o.result["left_out"].items()}
     assert left_out == {"mixed_0": "stalled: stuck", "mixed_2": "no room", "mixed_3": "converged: "}
-    kept = read_arrays(tmp_path / outcomes[0].files[0])
-    assert kept.keys() == {"mixed_1"} and kept["mixed_1"].dtype == np.float32
+    clips = read_arrays(tmp_path / outcomes[0].files[0])
+    assert clips.keys() == {"mixed_1"} and clips["mixed_1"].dtype == np.float32
     truncated = clips_of(0, tmp_path, assets, "fast-lbfgs-10")
     assert truncated.result["clips"] == ["mixed_0", "mixed_1"]  # it is stopped on purpose
 
@@ -104,13 +104,13 @@ def test_a_network_learns_from_given_motions_and_from_the_clips_that_are_there(t
     odd["mixed_1"] = lambda clip, entry: dataclasses.replace(still(clip, entry), status="stalled")
     assets = assets_of(tube_dress(), MOTION)
     clips = {("clips", str(part)): clips_of(part, tmp_path, assets) for part in range(2)}
-    done = whole(tmp_path, MOTION.name)
+    outcome = whole(tmp_path, MOTION.name)
     task = training("supervised", MOTION.name, steps=1)
     task = dataclasses.replace(task, reads=(*task.reads, *clips))
-    result = train(task, context(tmp_path, assets), {("data", MOTION.name): done, **clips}).result
+    result = train(task, context(tmp_path, assets), {("data", MOTION.name): outcome, **clips}).result
     assert result["frames"] == 90 + 2 * CLIP_FRAMES
     assert result["clips_left_out"] == 1 and result["left_out"] == []
-    lost = train(task, context(tmp_path, assets), {("data", MOTION.name): done}).result
+    lost = train(task, context(tmp_path, assets), {("data", MOTION.name): outcome}).result
     assert lost["frames"] == 90
 
 
@@ -126,8 +126,8 @@ def test_the_same_simulations_serve_every_seed_and_training(tmp_path, monkeypatc
         TRAININGS["tailornet"], simulated=Simulated(mixed=2, method="fast-lbfgs-10")
     )
     monkeypatch.setitem(TRAININGS, "tailornet", mine)
-    more = dataclasses.replace(TRAININGS["supervised"], simulated=Simulated(mixed=3))
-    monkeypatch.setitem(TRAININGS, "supervised", more)
+    recipe = dataclasses.replace(TRAININGS["supervised"], simulated=Simulated(mixed=3))
+    monkeypatch.setitem(TRAININGS, "supervised", recipe)
     scene, names = dressed_scene("kick"), ("supervised", "santesteban2019", "tailornet", "snug")
     cells = tuple(
         Cell(scene, find_method(name), seed, ("garments",)) for name in names for seed in (0, 1)
@@ -143,13 +143,13 @@ def test_the_same_simulations_serve_every_seed_and_training(tmp_path, monkeypatc
 
 @pytest.mark.slow
 def test_training_motions_are_simulated_and_written_once_all_are_whole(tmp_path, monkeypatch, capsys):
-    done: list[str] = []
+    names: list[str] = []
 
     def draped(scene, entry, folder):  # in place of a simulation: the garment skinned to the body
-        if not done:
-            done.append("broken")
+        if not names:
+            names.append("broken")
             raise RuntimeError("no room")
-        done.append(scene.dressed.motion.name)
+        names.append(scene.dressed.motion.name)
         worn = scene.dressed
         positions = DressedBody(worn.body, worn.garment).skin(worn.motion)
         return Trajectory(positions, worn.garment.faces, np.arange(len(positions)) / 30)
@@ -160,11 +160,12 @@ def test_training_motions_are_simulated_and_written_once_all_are_whole(tmp_path,
     Path("reports").touch()  # no folder of runs can be made here, nor is one needed
     out = tmp_path / "motions.h5"
     arguments = ["tshirt/training-motions", "--set", "sizes=smoke", "-o", str(out)]
+    assert export.main([*arguments, "--reference"]) == 2 and "are of a scene" in capsys.readouterr().err
     assert export.main(arguments) == 2
     assert "failed: RuntimeError: no room" in capsys.readouterr().err and not out.exists()
     assert export.main(arguments) == 0  # what was finished is not simulated again
     with h5py.File(out) as file:
         motions = [group.attrs["name"] for group in file.values()]
-    assert sorted(done) == sorted([*motions, "broken"]) and set(motions) <= set(TRAIN)
+    assert sorted(names) == sorted([*motions, "broken"]) and set(motions) <= set(TRAIN)
     assert f"{len(motions)} training motions of tshirt in {out}" in capsys.readouterr().out
     assert sorted(path.name for path in tmp_path.iterdir()) == ["motions.h5", "reports"]

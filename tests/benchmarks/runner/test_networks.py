@@ -70,11 +70,11 @@ def test_a_file_takes_the_place_of_the_training_that_made_it(made, tmp_path):
     job = training_of(plan_with(tmp_path, "pbns"))
     source, refusal = find_pretrained(job, folder)
     assert source and not refusal
-    done = take(job, source, context(tmp_path), {})
+    result = take(job, source, context(tmp_path), {})
     tensors, other = (weights(job.path(RunFolder(place))) for place in (folder, tmp_path))
     assert all(torch.equal(tensors[name], other[name]) for name in tensors | other)
-    facts = {"pretrained": "pbns-seed0", "trained_at": done.result["trained_at"], "data_seconds": 0}
-    assert done.result == outcome.result | facts and done.origin["hardware"]
+    facts = {"pretrained": "pbns-seed0", "trained_at": result.result["trained_at"], "data_seconds": 0}
+    assert result.result == outcome.result | facts and result.origin["hardware"]
 
 
 @pytest.mark.parametrize(
@@ -135,13 +135,13 @@ def test_a_network_of_the_package_stands_beside_the_trained_one_where_it_fits(tm
 
 def test_every_row_of_a_pretrained_network_says_so(made, tmp_path):
     plan = plan_with(tmp_path, "pbns", "skinning", trained=made[0])
-    (taken,) = (task for task in tasks_of(plan) if task.kind == "network")
-    done = taken.run(context(tmp_path), {})
-    done = dataclasses.replace(done, origin={"hardware": "a processor of theirs"})
-    outcomes = {cell.id(): RAN for cell in plan.cells} | {taken.id: done}
+    (import_task,) = (task for task in tasks_of(plan) if task.kind == "network")
+    outcome = import_task.run(context(tmp_path), {})
+    outcome = dataclasses.replace(outcome, origin={"hardware": "a processor of theirs"})
+    outcomes = {cell.id(): RAN for cell in plan.cells} | {import_task.id: outcome}
     outcomes |= {cell.id("metrics"): Outcome(result={"energy/strain": 0.1}) for cell in plan.cells}
     rows = rows_of(plan, tasks_of(plan), outcomes)
-    remark = f"pretrained network pbns-seed0 of {done.result['trained_at']}"
+    remark = f"pretrained network pbns-seed0 of {outcome.result['trained_at']}"
     assert {row.reason for row in rows if row.method == "pbns"} == {remark}
     assert {row.pretrained for row in rows} == {remark, ""}
     theirs = {row.metric for row in rows if row.hardware == "a processor of theirs"}
@@ -162,18 +162,18 @@ CHECKPOINT = ".snug-seed0.checkpoint.safetensors"
 def test_a_training_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
     monkeypatch.setattr("benchmarks.runner.networks.CHECKPOINT_MINUTES", 1e-9)
     dressed, motion = tube_dress(), swaying(30)
-    assets, step, done = assets_of(dressed, motion), Trainer.step, []
+    assets, step, steps = assets_of(dressed, motion), Trainer.step, []
 
     def trained(folder, key, stop=99):
         """Train, in this run as far as some steps; `done` are those of this run."""
 
         def counted(self, number):
-            if len(done) == stop:
+            if len(steps) == stop:
                 raise KeyboardInterrupt
-            done.append(number)
+            steps.append(number)
             return step(self, number)
 
-        done.clear()
+        steps.clear()
         monkeypatch.setattr(Trainer, "step", counted)
         return train(training("snug", motion.name, steps=5, key=key), context(folder, assets), {})
 
@@ -181,13 +181,13 @@ def test_a_training_that_was_killed_goes_on_where_it_was(tmp_path, monkeypatch):
     for key in ("before", "now"):  # the first is another training: of other inputs, or of other code
         with pytest.raises(KeyboardInterrupt):
             trained(tmp_path, key, 3)
-        assert done == list(range(3))
+        assert steps == list(range(3))
         assert [path.name for path in models.iterdir()] == [CHECKPOINT]
-    assert trained(tmp_path, "now").result["steps"] == 5 and done == [3, 4]
+    assert trained(tmp_path, "now").result["steps"] == 5 and steps == [3, 4]
     (tmp_path / "damaged" / "models").mkdir(parents=True)
     (tmp_path / "damaged" / "models" / CHECKPOINT).write_bytes(b"half")
     trained(tmp_path / "damaged", "now")
-    assert done == list(range(5))
+    assert steps == list(range(5))
     assert [path.name for path in models.iterdir()] == ["snug-seed0.safetensors"]
 
 

@@ -13,7 +13,7 @@ from benchmarks.methods import find_method
 from benchmarks.plan.cell import Cell
 from benchmarks.plan.motions import Motions
 from benchmarks.results.row import Row
-from benchmarks.runner.cells import judge
+from benchmarks.runner.cells import judge, misshapen
 from benchmarks.runner.execute_plan import is_accepted
 from benchmarks.runner.rows import clock_costs, rows_of
 from benchmarks.runner.run_json import RunLog
@@ -37,6 +37,7 @@ def trajectory(frames=4, **changes) -> Trajectory:
 
 
 FOUR = SimpleNamespace(frames=4, cloth=SimpleNamespace(vertex_count=3))
+assert misshapen(np.zeros(3), FOUR, other_mesh=True).startswith("gives positions float64 (3,)")
 CONVERGED = {"converged": np.array([1, 1, 0, 0.0])}
 
 

@@ -100,10 +100,10 @@ def run_dressed(folder: Path) -> dict:
     """Run the command into `folder` and return its rows without costs and measured times."""
     assert run.main([*DRESSED, "-o", str(folder)]) == 0
     rows = RunFolder(folder).read_rows()
-    kept = [
+    untimed = [
         row for row in rows if not row.metric.startswith("cost/") and row.unit not in ("s", "ms", "MB")
     ]
-    return {(r.method, r.metric, r.seed): (r.value, r.status, r.reason, r.uncertainty) for r in kept}
+    return {(r.method, r.metric, r.seed): (r.value, r.status, r.reason, r.uncertainty) for r in untimed}
 
 
 @pytest.fixture(scope="module")
@@ -174,12 +174,12 @@ def test_what_did_not_come_back_is_a_failed_row_and_the_next_case_is_run(tmp_pat
 
 
 def test_a_case_is_computed_once_and_again_when_it_declares_something_else(tmp_path):
-    known = next(c for c in KNOWN_ANSWERS if c.smoke and c.tolerance is not None)
-    first, runner = rows_of_cases(tmp_path, known)
+    answer = next(c for c in KNOWN_ANSWERS if c.smoke and c.tolerance is not None)
+    first, runner = rows_of_cases(tmp_path, answer)
     assert runner.reused == []
-    again, runner = rows_of_cases(tmp_path, known)
-    assert again == first and runner.reused == [f"case {known.name}"]
-    off = dataclasses.replace(known, expected=(known.expected or 0.0) + 1e6, tolerance=1e-9)
+    again, runner = rows_of_cases(tmp_path, answer)
+    assert again == first and runner.reused == [f"case {answer.name}"]
+    off = dataclasses.replace(answer, expected=(answer.expected or 0.0) + 1e6, tolerance=1e-9)
     (failed,), runner = rows_of_cases(tmp_path, off)
     assert failed.status == "failed" and runner.reused == []
-    assert f"case {known.name}: cached (failed: " in execution.describe(plan_of(tmp_path, cases=(off,)))
+    assert f"case {answer.name}: cached (failed: " in execution.describe(plan_of(tmp_path, cases=(off,)))

@@ -69,8 +69,8 @@ def test_a_dry_run_decides_as_the_run_does(tmp_path):
         preview = Runner(tasks, Cache(RunFolder(tmp_path), **options)).preview()
         planned = {task.name for task, _, outcome in preview if outcome is None}
         runner = finish(tmp_path, *tasks, **options)
-        kept = {name for (_, name), outcome in runner.outcomes.items() if outcome.content}
-        return planned, kept - {title.split()[1] for title in runner.reused}
+        names = {name for (_, name), outcome in runner.outcomes.items() if outcome.content}
+        return planned, names - {title.split()[1] for title in runner.reused}
 
     everything = {"first", "second", "third", "fourth"}
     assert planned_and_done("raise") == (everything, everything - {"second"})
@@ -175,12 +175,12 @@ def test_the_time_left_never_grows_and_a_stage_begins_with_a_line(capsys):
     tasks = [
         Task(kind="cell", name=str(n), label="", stage=f"part {n // 5}", run=print) for n in range(10)
     ]
-    progress, seen = Progress(tasks, workers=2), []
+    progress, times = Progress(tasks, workers=2), []
     for each, seconds in zip(tasks, (0.1, 90.0, 3.0, 0.0, 400.0, 0.2, 1.0, 1.0, 700.0, 0.1)):
         progress.begin(each)
         progress.time_left()
-        seen.append(progress.shown)
+        times.append(progress.shown)
         progress.end(each, seconds)
-    assert seen == sorted(seen, reverse=True) and seen[-1] < seen[0]
+    assert times == sorted(times, reverse=True) and times[-1] < times[0]
     lines = capsys.readouterr().err.splitlines()
     assert [line.partition(";")[0] for line in lines] == ["part 0: 5 tasks", "part 1: 5 tasks"]

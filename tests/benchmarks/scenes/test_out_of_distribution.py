@@ -51,30 +51,30 @@ def models(assets, tmp_path_factory):
 def rolled_out(assets, models, name, method):
     """The built scene, and the method that has rolled out in it."""
     scene = find_scene(name).at(SMOKE).build(assets)
-    made = prepared(method, scene, models)
-    return scene, made, made.run().positions
+    runner = prepared(method, scene, models)
+    return scene, runner, runner.run().positions
 
 
 def test_what_is_hard_about_each(assets):
     names = ("walk_x4", "root_glitch", "limb_glitch", "splits", "arms_crossed")
     scenes = {name: find_scene(f"out_of_distribution/{name}").at(SMOKE).build(assets) for name in names}
-    made = {name: scene.dressed.motion for name, scene in scenes.items()}
+    motions = {name: scene.dressed.motion for name, scene in scenes.items()}
     walk = make_motion("walk")
-    assert np.array_equal(made["walk_x4"].poses, walk.poses[::4])
+    assert np.array_equal(motions["walk_x4"].poses, walk.poses[::4])
     plain, wrong = hard_motions.ordinary(walk), hard_motions.GLITCH
-    jump = made["root_glitch"].translations - plain.translations
+    jump = motions["root_glitch"].translations - plain.translations
     assert np.flatnonzero(jump.any(axis=1)).tolist() == [wrong]
     assert np.linalg.norm(jump) == pytest.approx(1.0)
-    flip = np.argwhere((made["limb_glitch"].poses != plain.poses).any(axis=2))
+    flip = np.argwhere((motions["limb_glitch"].poses != plain.poses).any(axis=2))
     assert flip.tolist() == [[wrong, JOINT["left_shoulder"]]]
     turned = [
-        rotation_matrices(m.poses[wrong, JOINT["left_shoulder"]]) for m in (plain, made["limb_glitch"])
+        rotation_matrices(m.poses[wrong, JOINT["left_shoulder"]]) for m in (plain, motions["limb_glitch"])
     ]
     assert np.trace(turned[0].T @ turned[1]) == pytest.approx(-1.0)  # half a turn
-    joints = joint_positions(made["splits"].poses, made["splits"].translations)[-1]
+    joints = joint_positions(motions["splits"].poses, motions["splits"].translations)[-1]
     ankles = joints[JOINT["left_ankle"]] - joints[JOINT["right_ankle"]]
     assert abs(ankles[0]) > 1.4  # [m] apart sideways: splits
-    joints = joint_positions(made["arms_crossed"].poses, made["arms_crossed"].translations)[-1]
+    joints = joint_positions(motions["arms_crossed"].poses, motions["arms_crossed"].translations)[-1]
     wrists = joints[JOINT["left_wrist"]] - joints[JOINT["right_wrist"]]
     assert wrists[0] < -0.1  # the left one is on the right
 
@@ -88,10 +88,10 @@ def roll_outs(assets, models):
     def both(name):
         positions = {method: run(name, method)[2] for method in ("skinning", "snug")}
         group = grouped(run(name, "skinning")[0], positions, suites=("extremes",))
-        made = dict(zip(positions, group.roll_outs))
-        for method, rolled in made.items():
+        by_name = dict(zip(positions, group.roll_outs))
+        for method, rolled in by_name.items():
             rolled.counterpart = run(ORDINARY, method)[2]
-        return made
+        return by_name
 
     return both
 
@@ -119,14 +119,14 @@ def test_the_body_of_another_shape_is_seen_by_every_method(assets, models):
     dressed = DressedBody(assets.body, assets.garments["tshirt"])
     model = TrainedModel.load(model_path(models, "snug", 0))
     for method in ("snug", "snug+cleanup", "skinning"):
-        scene, made, x = rolled_out(assets, models, "out_of_distribution/girth_+5", method)
+        scene, result, x = rolled_out(assets, models, "out_of_distribution/girth_+5", method)
         betas = scene.dressed.betas
         assert betas.tolist()[:2] == [0.0, 5.0] and len(betas) == assets.body.shape_count
         if method == "snug":
             by_hand = roll_out(model, dressed, scene.dressed.motion, betas).positions
             assert np.array_equal(x, by_hand)
             still = roll_out(model, dressed, scene.dressed.motion, betas, quasi_static=True)
-            assert np.array_equal(made.quasi_static().positions, still.positions)
+            assert np.array_equal(result.quasi_static().positions, still.positions)
         if method == "snug+cleanup":
             clean = CollisionPostProcessing(dressed, scene.obstacle.positions)
             assert np.array_equal(x, [clean(frame, number) for number, frame in enumerate(by_hand)])

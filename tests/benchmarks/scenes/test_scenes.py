@@ -70,7 +70,7 @@ def test_an_own_body_wears_the_garment_and_makes_stale_what_was_on_another(tmp_p
     path, again = (write_body(tmp_path / f"{name}.npz", 1.1) for name in ("tall", "again"))
     same, other = (read_inputs(body=Path(file)).body.digest for file in (path, again))
     assert same == other  # what was read is known again, not its file
-    plans = [planned("full:garments", "--methods", "snug", *more) for more in ((), ("--body", path))]
+    plans = [planned("full:garments", "--methods", "snug", *words) for words in ((), ("--body", path))]
     for one, other in zip(*map(tasks_of, plans), strict=True):
         same = dependencies(one, {}) == dependencies(other, {})
         assert one.id == other.id and (one.kind not in ("network", "cell") or not same), one.id
@@ -145,8 +145,8 @@ def test_solvers_of_a_dressed_body_load_no_network_library(tmp_path):
     assets = open_assets(SMOKE, make_motions(["kick"]), ["tshirt"])
     scene = dressed_scene("kick").build(assets)
     motion, path = assets.motions["kick"], tmp_path / "given"
-    given = (assets, scene.start, motion.cut(0, 4))
-    path.write_bytes(pickle.dumps(given))
+    inputs = (assets, scene.start, motion.cut(0, 4))
+    path.write_bytes(pickle.dumps(inputs))
     environment = os.environ | {"PYTHONPATH": str(ROOT)}
     modules = subprocess.check_output(
         [sys.executable, "-c", DRESSED, str(path)], text=True, env=environment

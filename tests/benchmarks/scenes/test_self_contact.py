@@ -64,8 +64,8 @@ def test_another_material_is_minimised_beside_the_barrier(exchange, pressed_toge
     minimised = {term.name: term for term in other.stepper.potential.energies}
     assert minimised["barrier"] is scene.minimised[-1]
     for declared, theirs in zip(scene.energies, other.scene.energies):
-        mine, kept = minimised[theirs.name], theirs is declared
-        assert type(mine) is type(theirs) and (mine is declared) == kept
+        mine, same = minimised[theirs.name], theirs is declared
+        assert type(mine) is type(theirs) and (mine is declared) == same
         assert mine.parameters() == theirs.parameters()
 
 

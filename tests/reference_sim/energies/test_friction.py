@@ -80,10 +80,10 @@ def test_friction_without_the_step_before_is_refused():
         return friction.value_and_gradient(x)[0]
 
     belt = scene.obstacle
-    for frame, obstacle, known in (
+    for frame, obstacle, accepted in (
         (5, belt, False), (6, belt, True), (8, belt, False), (9, belt.refine(2), False), (1, belt, True),
     ):  # fmt: skip
-        if known:
+        if accepted:
             assert value(frame, obstacle) > 0
         else:
             with pytest.raises(ValueError, match="step of the frame before"):

@@ -108,12 +108,12 @@ def computed(name: str) -> dict[tuple[str, int, str], float]:
 def test_the_energies_are_those_that_were_kept(scene, tolerance=1e-9):
     with STORE.open(newline="", encoding="utf-8") as stream:
         rows = [row for row in csv.reader(stream) if row[0] == scene]
-    kept = {(name, int(frame), term): float(energy) for name, frame, term, energy in rows}
+    energies = {(name, int(frame), term): float(energy) for name, frame, term, energy in rows}
     new = computed(scene)
-    assert new.keys() == kept.keys()
+    assert new.keys() == energies.keys()
     for (_, frame, term), value in new.items():
-        expected = kept[scene, frame, term]
-        largest = max(abs(energy) for (_, _, name), energy in kept.items() if name == term)
+        expected = energies[scene, frame, term]
+        largest = max(abs(energy) for (_, _, name), energy in energies.items() if name == term)
         assert abs(value - expected) <= tolerance * largest, (
             f"{scene}, frame {frame}: {term} {expected!r} -> {value!r} J; if that is meant: "
             "python -m tests.reference_sim.energies.test_regression"

@@ -57,9 +57,9 @@ def pickled(path: Path, content: object, protocol: int = 4) -> Path:
 
 @pytest.mark.parametrize("protocol", (0, 5))
 def test_a_pickle_gives_its_arrays_by_name(tmp_path, protocol):
-    read = read_pickled_arrays(pickled(tmp_path / "a.pkl", ROLL_OUT, protocol), ROLL_OUT)
-    assert set(read) == set(ROLL_OUT) - {"metrics", "config"}
-    for key, array in read.items():
+    arrays = read_pickled_arrays(pickled(tmp_path / "a.pkl", ROLL_OUT, protocol), ROLL_OUT)
+    assert set(arrays) == set(ROLL_OUT) - {"metrics", "config"}
+    for key, array in arrays.items():
         value = ROLL_OUT[key].toarray() if key == "columns" else np.asarray(ROLL_OUT[key])
         assert type(array) is np.ndarray and array.dtype.kind == value.dtype.kind
         np.testing.assert_array_equal(array, value)
@@ -89,9 +89,9 @@ def test_an_official_body_of_python_2_is_read(tmp_path):
     sparse += b"".join(b"U" + bytes([len(key)]) + key + python2(value) for key, value in parts.items())
     sparse += b"U\x06_shapeK\x03K\x02\x86ub"
     content = b"\x80\x02}(U\tshapedirs" + chumpy + b"U\x0bJ_regressor" + sparse + b"u."
-    read = read_pickled_arrays(pickled(tmp_path / "smpl.pkl", content), ("shapedirs", "J_regressor"))
-    np.testing.assert_array_equal(read["shapedirs"], shapes)
-    np.testing.assert_array_equal(read["J_regressor"], [[0, 1], [1, 0], [0, 0]])
+    arrays = read_pickled_arrays(pickled(tmp_path / "smpl.pkl", content), ("shapedirs", "J_regressor"))
+    np.testing.assert_array_equal(arrays["shapedirs"], shapes)
+    np.testing.assert_array_equal(arrays["J_regressor"], [[0, 1], [1, 0], [0, 0]])
 
 
 class Shell(str):

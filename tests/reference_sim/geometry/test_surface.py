@@ -60,6 +60,7 @@ def with_vertex(frame: int, vertex: int, place) -> np.ndarray:
     [
         (BALL, FACES, r"expected \(T, B, 3\) and \(F, 3\)"),
         (BALL[None], FACES + 1, r"vertex outside 0\.\.17"),
+        (BALL[None], FACES + 0.5, "vertex outside"),
         (with_vertex(1, 4, np.nan), FACES, "vertex 4 of frame 1 is not finite"),
         (with_vertex(2, FACES[5, 0], BALL[FACES[5, 1]]), FACES, "has no area in frame 2: remove it"),
         (BALL[None], FACES[1:], r"not closed: edge \(\d+, \d+\) of face \d+ has one face only: fill"),

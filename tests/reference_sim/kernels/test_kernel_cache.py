@@ -35,12 +35,12 @@ CALL = (
 def call(path: Path, **environment: str) -> tuple[float, bool, Path]:
     """10 (2 (3 + 1))^2 + 2 3 + 3 3 at first, by a new process; whether it came from the disk; from where."""
     variables = {k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"} | environment
-    done = subprocess.run(
+    process = subprocess.run(
         [sys.executable, "-B", "-c", CALL], cwd=path, capture_output=True, text=True,
         env=variables | {"PYTHONPATH": f"{ROOT}{os.pathsep}{path}"},
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    value, hits, place = done.stdout.splitlines()
+    assert process.returncode == 0, process.stderr
+    value, hits, place = process.stdout.splitlines()
     return float(value), hits == "1", Path(place)
 
 

@@ -11,7 +11,7 @@ from matplotlib.text import Text
 from matplotlib.transforms import Bbox
 
 from reports.blocks import FIGURES
-from reports.figures.charts import curves_of, error_of_page_one
+from reports.figures.charts import curves_of
 from reports.figures.plotting import PAGE_WIDTH, Drawing, style
 from reports.statistics.outcomes import PUBLISHED, read_published
 from reports.statistics.pareto import Point
@@ -89,8 +89,8 @@ def texts(canvas) -> tuple[list[Text], list[Text]]:
 def test_methods_keep_their_order_and_their_look():
     names = ["zebra", "newton-8", "snug", "newton-2", "simulation", "newton-4", "skinning"]
     run = run_of([row(method=name) for name in names])
-    known = ["simulation", "skinning", "snug", "zebra", "newton-2", "newton-4", "newton-8"]
-    assert run.order(names) == known
+    labels = ["simulation", "skinning", "snug", "zebra", "newton-2", "newton-4", "newton-8"]
+    assert run.order(names) == labels
     assert style(run, "newton-2").label == "Newton, 2 iterations"
     assert style(run, "newton-2").colour == style(run, "newton-4").colour
 
@@ -117,11 +117,3 @@ def test_solvers_stopped_early_are_one_curve_and_variants_of_the_reference_stand
     assert started.look.colour == alone[0].look.colour != solvers.look.colour
     assert started.look.label == "SNUG + solver"
     assert len(curves("simulation-perturbed-1e-4")) == 1
-
-
-@pytest.mark.parametrize(("error", "drawn"), [(0.5, True), (5.0, False)])
-def test_the_line_of_the_best_is_named_where_it_is_drawn(error, drawn):
-    numbers = [("skinning", 0.1, 1.0), ("snug", 0.2, error)]
-    rows = [row(method=name, metric="cost/frame", value=time, unit="ms") for name, time, _ in numbers]
-    rows += [row(method=name, metric="distance/rms", value=far, unit="mm") for name, _, far in numbers]
-    assert ("Pale line" in error_of_page_one(run_of(rows)).caption) is drawn

@@ -38,18 +38,18 @@ def seeds(method, values, metric="energy/strain", motions=MOTIONS, **more):
 
 
 def test_every_method_of_a_claim_is_one_that_can_be_run():
-    known = {entry.name for entry in METHODS}
-    assert {name for claim in CLAIMS for name in (claim.lower, claim.higher)} <= known
+    names = {entry.name for entry in METHODS}
+    assert {name for claim in CLAIMS for name in (claim.lower, claim.higher)} <= names
     assert len({(claim.metric, claim.lower, claim.higher) for claim in CLAIMS}) == len(CLAIMS)
 
 
 def test_the_amplitude_of_a_hem_stands_behind_its_correlation_and_never_alone():
-    both = ["dynamics/correlation", "dynamics/amplitude"]
-    claims = [claim for claim in CLAIMS if claim.metric in both]
-    assert [claim.metric for claim in claims] == both * (len(claims) // 2)
+    metrics = ["dynamics/correlation", "dynamics/amplitude"]
+    claims = [claim for claim in CLAIMS if claim.metric in metrics]
+    assert [claim.metric for claim in claims] == metrics * (len(claims) // 2)
     assert [c.lower + c.higher for c in claims[::2]] == [c.lower + c.higher for c in claims[1::2]]
     for names in (list_metrics(), AT_REFERENCE, ANSWERS):
-        assert [name for name in names if name in both] == both
+        assert [name for name in names if name in metrics] == metrics
 
 
 EVEN = (0.1, 0.1002, 0.1001)
@@ -130,10 +130,10 @@ def test_two_orders_of_magnitude_are_judged_with_their_factor(supervised, verdic
         "tailornet": {"data": 0.7 * supervised, "setup": 1.0, "train": 0.3 * supervised},
     }
     rows = [
-        given
+        times
         for method, parts in costs.items()
         for part, value in parts.items()
-        for given in seeds(method, [0.99 * value, value, 1.01 * value], f"cost/{part}", unit="s")
+        for times in seeds(method, [0.99 * value, value, 1.01 * value], f"cost/{part}", unit="s")
     ]
     line = told(rows)[COST]
     assert line.claim.factor == 100.0 and line.verdict == verdict
@@ -206,8 +206,8 @@ def test_the_share_of_frames_with_more_energy_is_counted_scene_by_scene_and_seed
     frames = frame_table(
         snug=[[1, 1, 9, 3], [1, 1, 1]], pbns=[[2, 2, 2, 3, 5], [2, 2, np.nan]], other=[[0.0]]
     )
-    made = add_shares(run.frame, frames, "strain", "snug", "pbns")
-    shares = made[made["metric"] == share_of_frames("strain").name]
+    table = add_shares(run.frame, frames, "strain", "snug", "pbns")
+    shares = table[table["metric"] == share_of_frames("strain").name]
     percentages = {(line.method, line.seed): line.value for line in shares.itertuples()}
     assert percentages == {("snug", 0): 25.0, ("snug", 1): 0.0, ("pbns", 0): 50.0, ("pbns", 1): 100.0}
     assert set(shares["unit"]) == {"%"} and shares["usable"].all() and len(shares) == 4 * len(MOTIONS)

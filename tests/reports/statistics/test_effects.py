@@ -215,8 +215,8 @@ def test_shares_of_excess_are_compared_by_logarithm_above_one_percent_and_by_dif
     assert comparison.shown == pytest.approx(np.sinh(logs.mean())) and comparison.shown < motions.mean()
     ends = np.sinh(t_interval(logs.mean(), logs.std(ddof=1) / 2.0, 3))
     assert comparison.interval == pytest.approx(tuple(ends), rel=3 * NOISE)
-    less = effect(mean_over(0.5 * motions), mean_over(motions, "pbns"), EXCESS)
-    assert less.shown == pytest.approx(-0.5 * comparison.shown, rel=0.1) and less.interval[1] < 0.0
+    halved = effect(mean_over(0.5 * motions), mean_over(motions, "pbns"), EXCESS)
+    assert halved.shown == pytest.approx(-0.5 * comparison.shown, rel=0.1) and halved.interval[1] < 0.0
     # Points between two shares are the same in either order.
     large = motions * np.array([[90.0], [150.0], [70.0], [120.0]])
     difference = effect(mean_over(motions), mean_over(large, "pbns"), EXCESS)
@@ -258,8 +258,8 @@ def test_two_starts_make_the_noise_and_smaller_steps_a_trend_that_may_turn_the_s
     assert comparison.against == pytest.approx({TWINS[1]: 1.2, TWINS[2]: 1.4})
     assert comparison.value == pytest.approx(-0.3) and comparison.find_reversals() == list(TWINS[1:])
     # What a member does to both methods moves them not apart, on the scale of the test.
-    both = effect(*moved_means({"snug": snug, "pbns": snug}), DIFFERENCE)
-    assert both.uncertainty == pytest.approx(0.0) and both.find_reversals() == []
+    result = effect(*moved_means({"snug": snug, "pbns": snug}), DIFFERENCE)
+    assert result.uncertainty == pytest.approx(0.0) and result.find_reversals() == []
     logs = [np.log(1.0 + np.array(moves)).mean() for moves in zip(*snug)]
     noise = math.sqrt((logs[0] ** 2 + (logs[1] - logs[2]) ** 2) / 4.0)
     assert effect(*moved_means({"snug": snug, "pbns": none})).uncertainty == pytest.approx(noise)

@@ -9,7 +9,6 @@ import pytest
 from benchmarks.results.row import Row
 from reports.statistics.pareto import (
     Point,
-    find_fastest,
     front,
     noise_floor,
     points_of,
@@ -54,8 +53,6 @@ def all_rows() -> list[Row]:
 def test_the_front_holds_those_that_nothing_beats():
     points = [Point("a", 1.0, 5.0), Point("b", 2.0, 6.0), Point("c", 3.0, 1.0), Point("d", 3.0, 2.0)]
     assert [p.method for p in front(points)] == ["a", "c"]
-    assert find_fastest(points, 2.0) == points[2]
-    assert find_fastest(points, 0.5) is None
 
 
 def test_points_need_every_scene():
@@ -68,8 +65,12 @@ def test_points_need_every_scene():
     assert {p.method for p in solvers(run, worn)} == of_solvers
 
 
-def test_a_run_time_that_was_not_repeated_spreads_as_its_seeds():
+@pytest.mark.parametrize(
+    ("repeats", "spread"), [((), 2.0 * 2.0**0.5), ((5.0,), 2.0 * 2.0**0.5), ((200.0,), 4.0)]
+)
+def test_a_run_time_spreads_as_its_seeds_or_as_its_repeats_where_that_is_more(repeats, spread):
     rows = [row(SCENES[0], "newton-1", m, v) for m, v in (("cost/frame", 10.0), ("gap/energy", 0.2))]
+    rows += [row(SCENES[0], "snug", "cost/spread", x, seed=s) for x in repeats for s in (0, 1)]
     rows += [
         row(SCENES[0], "snug", metric, value, seed=seed)
         for seed, time in ((0, 1.0), (1, 3.0))
@@ -78,7 +79,7 @@ def test_a_run_time_that_was_not_repeated_spreads_as_its_seeds():
     run = run_of(rows)
     points = points_of(run, run.cells("speed"), "gap/energy")
     spreads = {p.method: p.time_spread for p in points}
-    assert spreads == {"newton-1": 0.0, "snug": pytest.approx(2.0 * 2.0**0.5)}  # twice the deviation
+    assert spreads == {"newton-1": 0.0, "snug": pytest.approx(spread)}
 
 
 def test_a_point_is_of_the_seeds_that_did_every_scene():

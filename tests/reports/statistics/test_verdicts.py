@@ -74,6 +74,12 @@ def test_one_reading_of_a_clock_gives_no_verdict_and_one_of_a_size_does():
     assert (decide(size, None), explain(size)) == (LESS, "")
 
 
+@pytest.mark.parametrize("name", ["dynamics/correlation", "dynamics/common_correlation"])
+def test_correlations_are_compared_by_differences_though_all_are_positive(name):
+    run = run_of([row(method=method, metric=name, value=0.5) for method in ("snug", "pbns")])
+    assert compare_methods(run, run.frame, run.metrics[name], "snug", "pbns").effect.scale == DIFFERENCE
+
+
 def test_a_time_step_with_another_sign_is_named():
     far = replace(FAR, against={"simulation-dt/4": -0.1, STEP: -0.3})
     assert explain(far) == f": other sign against {STEP}"

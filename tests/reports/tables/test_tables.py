@@ -89,9 +89,9 @@ def test_pairs_share_their_scenes_or_have_their_own():
 def test_the_mean_body_has_lines_and_words_where_there_is_one(norm, bodies):
     rows = [row(scene, metric="energy/strain", suite="shapes") for scene in SCENES]
     rows += [row(s, metric="body/shape", value=x, suite="shapes") for s, x in zip(SCENES, (norm, 2.0))]
-    (made,) = shapes(run_of(rows))
-    assert [line[0] for line in made.rows] == bodies
-    assert ("mean body" in made.caption) == ("mean shape" in bodies)
+    (table,) = shapes(run_of(rows))
+    assert [line[0] for line in table.rows] == bodies
+    assert ("mean body" in table.caption) == ("mean shape" in bodies)
 
 
 # frames and energy of each motion
@@ -109,8 +109,8 @@ def test_each_frame_weighs_the_same_on_the_papers_clips_and_on_all_motions():
     ]
     frames = [(f"tshirt/{motion}", k) for motion, (count, _) in MOTIONS.items() for k in range(count)]
     frames = pd.DataFrame(frames, columns=["scene", "seconds"])
-    made = paper_tables(replace(run_of(rows), frame_energies=frames))
-    one, two = (table.rows for table in made)
+    tables = paper_tables(replace(run_of(rows), frame_energies=frames))
+    one, two = (table.rows for table in tables)
     clips = "01_01 and 07_02"
     assert one[0] == (clips, "strain", 4.0, 0.111, 2.0, 0.064, 0.5, pytest.approx(0.064 / 0.111))
     assert one[2][-2:] == (None, None)  # gravity: its zero is a choice
@@ -119,9 +119,9 @@ def test_each_frame_weighs_the_same_on_the_papers_clips_and_on_all_motions():
     assert two[1] == (clips, "without strain", 14.0, 7.0, 14.0, 14.0, 19.1, 19.1 / 2.7)
     assert two[2][2:] == (pytest.approx(0.2), None, pytest.approx(0.2), pytest.approx(0.2), None, None)
     alone = run_of([r for r in rows if r.method != "simulation-dt/4"])
-    captions = made[1].caption, paper_tables(replace(alone, frame_energies=frames))[1].caption
+    captions = tables[1].caption, paper_tables(replace(alone, frame_energies=frames))[1].caption
     assert ["Below: the reference" in caption for caption in captions] == [True, False]
     full = [r for r in rows if r.method != "snug-paper-no-strain"]
     assert len(paper_tables(replace(run_of(full), frame_energies=frames))) == 1
     heading = next(place for place, block in enumerate(BLOCKS) if isinstance(block, str))
-    assert {table.name for table in made} < {block.name for block in BLOCKS[:heading]}  # page one
+    assert {table.name for table in tables} < {block.name for block in BLOCKS[:heading]}  # page one

@@ -42,10 +42,10 @@ def other_mesh(body: Body, faces: int = 13776) -> Body:
 
 def smpl_arrays(body: Body) -> dict[str, np.ndarray]:
     """In SMPL's layout, with a regressor that gives the body's joints exactly."""
-    known = np.concatenate([body.template[..., None], body.shape_directions], axis=2)
+    basis = np.concatenate([body.template[..., None], body.shape_directions], axis=2)
     joints = np.concatenate([body.joint_template[..., None], body.joint_directions], axis=2)
     regressor = np.linalg.lstsq(
-        known.reshape(len(body.template), -1).T, joints.reshape(24, -1).T, rcond=None
+        basis.reshape(len(body.template), -1).T, joints.reshape(24, -1).T, rcond=None
     )[0].T
     table = np.stack([np.array(PARENTS), np.arange(24)]).astype(np.uint32)  # the root's -1 is 2^32 - 1
     return {

@@ -36,23 +36,23 @@ def tube():
 
 
 def test_the_tshirt_written_and_read_is_the_tshirt(tmp_path, body, shirt):
-    read = read_garment(GarmentFile(path=saved(tmp_path, shirt)), body)
-    np.testing.assert_array_equal(read.rest_positions, shirt.rest_positions)
-    np.testing.assert_array_equal(read.faces, shirt.faces)
-    assert read.loops.keys() == shirt.loops.keys() and read.name == "mine" and not len(read.pins)
+    garment = read_garment(GarmentFile(path=saved(tmp_path, shirt)), body)
+    np.testing.assert_array_equal(garment.rest_positions, shirt.rest_positions)
+    np.testing.assert_array_equal(garment.faces, shirt.faces)
+    assert garment.loops.keys() == shirt.loops.keys() and garment.name == "mine" and not len(garment.pins)
     for name, loop in shirt.loops.items():
-        np.testing.assert_array_equal(read.loops[name], loop)
-    assert read.cloth().material == shirt.cloth().material
+        np.testing.assert_array_equal(garment.loops[name], loop)
+    assert garment.cloth().material == shirt.cloth().material
     # Its weights are blended over the face below, so near those of the nearest vertex.
-    np.testing.assert_allclose(read.skinning_weights.sum(axis=1), 1.0)
-    assert np.abs(read.skinning_weights - shirt.skinning_weights).sum(axis=1).mean() < 0.1
+    np.testing.assert_allclose(garment.skinning_weights.sum(axis=1), 1.0)
+    assert np.abs(garment.skinning_weights - shirt.skinning_weights).sum(axis=1).mean() < 0.1
 
 
 def test_a_chart_with_seams_is_its_rest_shape(tmp_path, body, shirt):
     uv = own_chart(shirt.rest_positions, shirt.faces)
     path = saved(tmp_path, shirt, uv=uv)
-    read = read_garment(GarmentFile(path=path, rest="uv"), body)
-    np.testing.assert_array_equal(read.rest_uv, uv)
+    garment = read_garment(GarmentFile(path=path, rest="uv"), body)
+    np.testing.assert_array_equal(garment.rest_uv, uv)
     assert read_garment(GarmentFile(path=str(path)), body).rest_uv is None
 
 
@@ -62,8 +62,8 @@ def test_a_chart_with_seams_is_its_rest_shape(tmp_path, body, shirt):
 def test_units_and_axes_give_the_same_garment(tmp_path, body, tube, units, metres, up):
     positions = tube.rest_positions / metres
     path = saved(tmp_path, tube, positions=z_up(positions) if up == "z" else positions)
-    read = read_garment(GarmentFile(path=path, units=units, up=up), body)
-    np.testing.assert_allclose(read.rest_positions, tube.rest_positions, rtol=0, atol=1e-12)
+    garment = read_garment(GarmentFile(path=path, units=units, up=up), body)
+    np.testing.assert_allclose(garment.rest_positions, tube.rest_positions, rtol=0, atol=1e-12)
 
 
 def test_whatever_is_inside_out_is_turned(tmp_path, body, tube):
@@ -86,11 +86,11 @@ def test_whatever_is_inside_out_is_turned(tmp_path, body, tube):
 
 def test_a_skirt_is_held_by_its_waist_and_follows_neither_leg(tmp_path, body):
     skirt = tailored("skirt", 300)
-    read = read_garment(GarmentFile(path=saved(tmp_path, skirt)), body)
-    assert set(read.loops) == {"waist", "hem"}
-    np.testing.assert_array_equal(read.pins, skirt.pins)
-    middle = np.abs(read.rest_positions[read.hem, 0]) < 0.02
-    left, right = (read.skinning_weights[read.hem][middle, JOINT[f"{side}_hip"]]
+    garment = read_garment(GarmentFile(path=saved(tmp_path, skirt)), body)
+    assert set(garment.loops) == {"waist", "hem"}
+    np.testing.assert_array_equal(garment.pins, skirt.pins)
+    middle = np.abs(garment.rest_positions[garment.hem, 0]) < 0.02
+    left, right = (garment.skinning_weights[garment.hem][middle, JOINT[f"{side}_hip"]]
                    for side in ("left", "right"))  # fmt: skip
     assert np.abs(left - right).max() < 0.2 and min(left.min(), right.min()) > 0.2
 
@@ -115,8 +115,8 @@ def test_legs_apart_are_no_sleeves_and_what_has_no_waist_does_not_hang(tmp_path,
 def test_tights_hang_from_their_waist_and_mittens_are_no_opening(tmp_path, body, shirt):
     """Tights are the skin below 1 m, arms left out, moved out by 8 mm."""
     arms = skin_following(body, ["left_wrist", "right_wrist", "left_hand", "right_hand"])
-    kept = body.faces[((body.template[:, 1] < 1.0) & ~arms)[body.faces].all(axis=1)]
-    used, faces = np.unique(kept, return_inverse=True)
+    kept_faces = body.faces[((body.template[:, 1] < 1.0) & ~arms)[body.faces].all(axis=1)]
+    used, faces = np.unique(kept_faces, return_inverse=True)
     skin = body.template + 0.008 * igl.per_vertex_normals(body.template, np.asarray(body.faces))
     path = saved(tmp_path, shirt, positions=skin[used], faces=faces.reshape(-1, 3))
     tights = read_garment(path, body)
@@ -130,10 +130,10 @@ def test_tights_hang_from_their_waist_and_mittens_are_no_opening(tmp_path, body,
 
 def test_each_piece_of_an_outfit_is_held_by_itself(tmp_path, body, shirt):
     skirt, count = tailored("skirt", 300), len(shirt.rest_positions)
-    both = np.concatenate([shirt.rest_positions, skirt.rest_positions])
+    points = np.concatenate([shirt.rest_positions, skirt.rest_positions])
     faces = np.concatenate([shirt.faces, skirt.faces + count])
-    read = read_garment(saved(tmp_path, shirt, positions=both, faces=faces), body)
-    np.testing.assert_array_equal(read.pins, skirt.pins + count)
+    garment = read_garment(saved(tmp_path, shirt, positions=points, faces=faces), body)
+    np.testing.assert_array_equal(garment.pins, skirt.pins + count)
 
 
 def test_its_material_is_that_of_simulator_and_training(tmp_path, body, tube):
@@ -184,9 +184,9 @@ def test_a_seam_is_joined_but_refused_where_a_program_left_it_open(tmp_path, bod
     """Cut along x = 0 in front from neck to hem: a tube that one long opening splits, its sides apart."""
     front = np.flatnonzero((np.abs(tube.rest_positions[:, 0]) < 0.02) & (tube.rest_positions[:, 2] > 0))
     positions, faces = doubled_along(tube.rest_positions, tube.faces, front)
-    read = read_garment(saved(tmp_path, tube, positions=positions, faces=faces), body)
-    np.testing.assert_array_equal(read.faces, tube.faces)
-    assert len(front) and len(read.rest_positions) == len(tube.rest_positions)
+    garment = read_garment(saved(tmp_path, tube, positions=positions, faces=faces), body)
+    np.testing.assert_array_equal(garment.faces, tube.faces)
+    assert len(front) and len(garment.rest_positions) == len(tube.rest_positions)
     positions[len(tube.rest_positions) :, 0] -= gap
     path = saved(tmp_path, tube, positions=positions, faces=faces)
     says = (
@@ -222,16 +222,16 @@ def test_check_says_what_was_found_and_how_to_mend_it(tmp_path, capsys, tube):
     bad = saved(tmp_path, tube, positions=1000 * tube.rest_positions, name="bad.obj")
     (tmp_path / "broken.obj").write_text("v 0 0\n")
     assert check.main([str(tmp_path / "broken.obj"), str(bad), str(good)]) == 1
-    shown = capsys.readouterr()
-    assert "line 1 is not understood" in shown.err and "give units=mm" in shown.err
-    assert "good.obj: can be used" in shown.out
+    printed = capsys.readouterr()
+    assert "line 1 is not understood" in printed.err and "give units=mm" in printed.err
+    assert "good.obj: can be used" in printed.out
 
 
 def test_training_by_a_command_takes_the_file_with_its_chart_and_material(tmp_path, body, tube):
     path = saved(tmp_path, tube, uv=100 * own_chart(tube.rest_positions, tube.faces))
     (tmp_path / "silk.toml").write_text("density = 300.0\n")
     words = f"{path},rest=uv,uv-scale=0.01,material={tmp_path / 'silk.toml'}"
-    read = train_command.choose_garment(train_command.parse_options(["--garment", words]), body)
-    assert read.cloth().material == Material(density=300.0) and len(read.rest_positions) == 150
-    np.testing.assert_allclose(read.cloth().rest_uv, own_chart(tube.rest_positions, tube.faces))
+    garment = train_command.choose_garment(train_command.parse_options(["--garment", words]), body)
+    assert garment.cloth().material == Material(density=300.0) and len(garment.rest_positions) == 150
+    np.testing.assert_allclose(garment.cloth().rest_uv, own_chart(tube.rest_positions, tube.faces))
     assert train_command.main(["--garment", "tshirt,up=z"]) == 2

@@ -48,8 +48,8 @@ def of_root(motion, turn):
 def columns(poses, joints):
     """(T, 3 joints): the body's joints where SMPL+H and SMPL-X have them, nothing in the fingers."""
     wide = np.zeros((len(poses), joints, 3))
-    kept = 24 if joints == 24 else 22
-    wide[:, :kept] = poses[:, :kept]
+    count = 24 if joints == 24 else 22
+    wide[:, :count] = poses[:, :count]
     return wide.reshape(len(poses), -1)
 
 

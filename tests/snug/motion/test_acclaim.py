@@ -13,6 +13,7 @@ from tests.snug.motion.motion_forms import amc_frame, read, refuse, write_clip
 REFUSED = [
     (".amc", lambda text: text.replace("head 0.0", "head nan", 1), "line 6: 'nan' should be 1 finite"),
     (".amc", lambda text: text.replace("head", "tail", 1), "line 6: 'tail' is no bone"),
+    (".amc", lambda text: text.replace("\n2\n", "\n3\n"), "frame 3 follows frame 1"),
     (".amc", lambda text: text[: len(text) * 3 // 4].rsplit("\n", 1)[0], "frame 2 is cut off"),
     (".asf", lambda text: text.replace("angle deg", "angle rad"), "only angles in degrees"),
     (".asf", lambda text: text.replace("femur", "thigh"), "no bone 'lfemur'"),

@@ -7,7 +7,6 @@ from snug.body.skeleton import (
     JOINT,
     PARENTS,
     REST_JOINTS,
-    joint_positions,
     rotation_matrices,
     sole_points,
 )
@@ -18,12 +17,9 @@ from snug.motion.motion import (
     Motion,
     MotionError,
     arm_clearance,
-    clear_arms,
     place,
     resample,
-    spread_arms,
 )
-from snug.motion.posture import poses_from_angles
 from tests.snug.motion.motion_forms import joint_speeds
 
 # Those made by code; tests of recorded clips are in test_recorded.
@@ -129,18 +125,6 @@ def test_resample_keeps_ends_duration_and_uniform_turning(frames, fps):
     np.testing.assert_allclose(turned, share * motion.poses[-1, JOINT["left_elbow"]], atol=1e-9)
     if frames == 121:
         np.testing.assert_allclose(sampled.poses, motion.poses[::4], atol=1e-12)
-
-
-def test_spread_arms_lifts_both_upper_arms_by_the_angle():
-    angles = {name: np.full(40, 70.0) for name in ("left_arm_lowering", "right_arm_lowering")}
-    hanging = Motion("hang", poses_from_angles(angles, 40), np.zeros((40, 3)))
-    joints = joint_positions(spread_arms(hanging, 20.0).poses, hanging.translations)
-    for side, outward in (("left", 1.0), ("right", -1.0)):
-        arm = joints[:, JOINT[f"{side}_elbow"]] - joints[:, JOINT[f"{side}_shoulder"]]
-        lowered = np.degrees(np.arctan2(-arm[:, 1], outward * arm[:, 0]))
-        np.testing.assert_allclose(lowered, 50.0, atol=1e-9)
-    close = arm_clearance(hanging).min()
-    assert close < ARMS_CLEAR < arm_clearance(clear_arms(hanging)).min()
 
 
 def test_place_faces_forward_on_the_floor():

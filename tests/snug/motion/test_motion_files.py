@@ -140,7 +140,7 @@ def test_a_published_split_is_read_by_number_from_folders_of_cmu_and_amass(tmp_p
         amass.mkdir(exist_ok=True)
         write(amass / f"{name}.npz", KICK)
     cmu.mkdir()
-    write_clip(cmu, [amc_frame(1)] * 3).rename(cmu / "07_02.amc")
+    write_clip(cmu, map(amc_frame, (1, 2, 3))).rename(cmu / "07_02.amc")
     write(cmu / "128_02.npz", KICK, poses=np.degrees(KICK.poses))
     with pytest.warns(UserWarning, match=r"128_02.npz: .* not degrees \(left out of split snug\)"):
         motions = load_motions(tmp_path, options=MotionFileOptions(split="snug"))
@@ -198,8 +198,8 @@ def test_who_does_not_stand_is_read_by_a_given_axis_and_refused_without(tmp_path
         ).as_matrix()
         clip = write(tmp_path / "clip.npz", Motion(kind, poses, path), turn)
         refuse(clip, "add ,up=")
-        pelvis, given = (Rotation.from_rotvec(p[:, 0]).inv() for p in (read(clip, up=up).poses, poses))
-        np.testing.assert_allclose(pelvis.apply([0, 1, 0]), given.apply([0, 1, 0]), atol=1e-8)
+        pelvis, expected = (Rotation.from_rotvec(p[:, 0]).inv() for p in (read(clip, up=up).poses, poses))
+        np.testing.assert_allclose(pelvis.apply([0, 1, 0]), expected.apply([0, 1, 0]), atol=1e-8)
 
 
 @pytest.mark.parametrize("turn", [Y_UP, TO_Z_UP], ids=["y up", "z up"])

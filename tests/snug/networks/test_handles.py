@@ -6,12 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 
 from snug.body.skeleton import rotation_matrices
-from snug.named_recipes import HANDLES
-from snug.networks.garment_network import make_network, perceptron
-from snug.networks.handles import WIDTHS, shape_functions
+from snug.networks.handles import shape_functions
 from tests.snug.training.dressing import tube_dress
 
 COUNT = 20
@@ -55,14 +52,3 @@ def test_handles_move_the_garment_rigidly_and_affinely_without_error(count):
     bent = (rest[:, 1:2] ** 2 * [1.0, 0.0, 0.0]).ravel()
     numbers = np.linalg.lstsq(columns, bent)[0]
     assert count > 2 or np.abs(columns @ numbers - bent).max() > 1e-3
-
-
-def test_a_seed_draws_the_perceptron_before_the_last_layer():
-    """Layers are drawn in the order of the published trainings: another gives a seed other networks."""
-    network = make_network("handles-80", 141, 150, replace(HANDLES, initialisation="torch"), seed=7)
-    with torch.random.fork_rng(devices=[]):
-        torch.manual_seed(7)
-        drawn = perceptron(141, *WIDTHS, activation=torch.nn.SiLU)
-    for parameter, same in zip(network.activations.parameters(), drawn.parameters(), strict=True):
-        assert torch.equal(parameter, same)
-    assert [name for name, _ in network.named_children()] == ["activations", "numbers"]  # as rules draw

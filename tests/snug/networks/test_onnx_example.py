@@ -27,10 +27,10 @@ def test_the_file_alone_gives_the_roll_out(tmp_path, body, name):
     session = runtime.InferenceSession(str(tmp_path / "a.onnx"))
     features = dressed.features(motion, model.recipe, feature_set=model.network.feature_set).numpy()
     turns, pelvis = dressed.transforms(motion.poses).numpy(), dressed.pelvis(motion)
-    state = [np.zeros(given.shape, np.float32) for given in session.get_inputs() if given.name == "state"]
+    state = [np.zeros(entry.shape, np.float32) for entry in session.get_inputs() if entry.name == "state"]
     assert len(state) == model.network.sequential
     expected = roll_out(model, dressed, motion).positions
     for frame, now in enumerate(features):
-        given = {"features": now, "transforms": turns[frame]} | dict(zip(["state"], state))
-        positions, *state = session.run(None, given)
+        inputs = {"features": now, "transforms": turns[frame]} | dict(zip(["state"], state))
+        positions, *state = session.run(None, inputs)
         assert np.abs(positions + pelvis[frame] - expected[frame]).max() < 2e-5

@@ -102,7 +102,7 @@ def test_closed_forms_hide_no_window_that_is_no_number():
     [
         ({"pose_input": "quaternion"}, "pose_input='quaternion'"),
         ({"momentum": 0.9}, "'momentum' is unknown or missing"),
-        ({"physics_weight": -1.0}, "physics_weight=-1.0: must not be negative"),
+        ({"physics_weight": -1.0}, "physics_weight=-1.0: must be at least 0"),
     ],
 )
 def test_recipe_refuses_nonsense(options, message):

@@ -27,21 +27,21 @@ def test_what_came_before_a_motion_is_known_to_inputs_and_state(kind):
     forgetful = np.array(list(prepare_frames(model, dressed, rest)()))
     assert kind == "pbns" or np.abs(forgetful - whole).max() > 1e-5
     make = prepare_frame_inputs(model, dressed, motion)
-    known = prepare_frame_inputs(model, dressed, rest, earlier=before)
-    assert torch.allclose(known(0)[0], make(5)[0], atol=1e-6)
+    inputs = prepare_frame_inputs(model, dressed, rest, earlier=before)
+    assert torch.allclose(inputs(0)[0], make(5)[0], atol=1e-6)
 
 
 def test_a_quasi_static_frame_forgets_the_past_and_the_velocity():
     dressed, motion = tube_dress(), swaying()
     model = random_model("snug", dressed, [motion], seed=0)
-    held = roll_out(model, dressed, motion, quasi_static=True)
+    static = roll_out(model, dressed, motion, quasi_static=True)
     reordered = type(motion)("back", motion.poses[::-1], motion.translations[::-1] * 2.0)
     back = roll_out(model, dressed, reordered, quasi_static=True)
     pelvis, other = dressed.pelvis(motion)[:, None], dressed.pelvis(reordered)[:, None]
-    assert np.abs((held.positions - pelvis) - (back.positions - other)[::-1]).max() < 1e-5
-    assert np.isnan(held.frame_seconds).all()
+    assert np.abs((static.positions - pelvis) - (back.positions - other)[::-1]).max() < 1e-5
+    assert np.isnan(static.frame_seconds).all()
     moving = roll_out(model, dressed, motion)
-    assert np.abs(moving.positions - held.positions).max() > 1e-5
+    assert np.abs(moving.positions - static.positions).max() > 1e-5
 
 
 def test_body_shape_changes_the_roll_out_and_the_network_sees_shapes_it_has_met():

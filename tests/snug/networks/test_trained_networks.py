@@ -18,8 +18,8 @@ def test_the_package_has_the_networks_of_the_default_run_and_stays_small():
     assert {"snug-tshirt", "pbns-tshirt"} <= set(NETWORKS)
     layers = ("reference_sim", "snug", "benchmarks", "reports")
     files = [path for layer in layers for path in (PACKAGE / layer).rglob("*") if path.is_file()]
-    kept = [path for path in files if "published" not in path.parts and "runs" not in path.parts]
-    assert sum(path.stat().st_size for path in kept if "__pycache__" not in path.parts) < LARGEST
+    paths = [path for path in files if "published" not in path.parts and "runs" not in path.parts]
+    assert sum(path.stat().st_size for path in paths if "__pycache__" not in path.parts) < LARGEST
 
 
 @pytest.mark.parametrize("name", NETWORKS)

@@ -22,12 +22,12 @@ class Replayed(CudaGraph):
 
     def __call__(self, *inputs):
         if not self._inputs:
-            self._inputs = tuple(given.clone() for given in inputs)
+            self._inputs = tuple(tensor.clone() for tensor in inputs)
             self._outputs = self.function(*self._inputs)
             return self._outputs
-        for held, given in zip(self._inputs, inputs, strict=True):
-            assert (held.shape, held.dtype) == (given.shape, given.dtype)
-            held.copy_(given)
+        for buffer, tensor in zip(self._inputs, inputs, strict=True):
+            assert (buffer.shape, buffer.dtype) == (tensor.shape, tensor.dtype)
+            buffer.copy_(tensor)
         overwrite(self._outputs, self.function(*self._inputs))
         return self._outputs
 
@@ -54,11 +54,11 @@ def capturing(monkeypatch, recipe, **options):
 
 
 def equal_states(plain, captured):
-    (weights, facts), (theirs, others) = plain.state(), captured.state()
-    assert weights.keys() == theirs.keys() and facts.keys() == others.keys()
-    assert facts["random"] == others["random"] and facts["contact"] == others["contact"]
-    assert facts["guard"] == others["guard"] | {
-        "usual": pytest.approx(others["guard"]["usual"], rel=1e-5)
+    (weights, facts), (theirs, their_facts) = plain.state(), captured.state()
+    assert weights.keys() == theirs.keys() and facts.keys() == their_facts.keys()
+    assert facts["random"] == their_facts["random"] and facts["contact"] == their_facts["contact"]
+    assert facts["guard"] == their_facts["guard"] | {
+        "usual": pytest.approx(their_facts["guard"]["usual"], rel=1e-5)
     }
     for name, tensor in weights.items():
         assert torch.allclose(tensor.double(), theirs[name].double(), rtol=1e-4, atol=1e-6), name

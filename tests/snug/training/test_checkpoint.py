@@ -91,8 +91,8 @@ def test_command_resumes_what_was_interrupted(tmp_path, monkeypatch, capsys):
     assert capsys.readouterr().err.endswith("snug.train: no space left\n")
     assert [path.name for path in tmp_path.iterdir()] == ["small.checkpoint.safetensors"]
     assert train.main(arguments) == 0
-    shown = capsys.readouterr().out
-    assert "4 steps" in shown
+    output = capsys.readouterr().out
+    assert "4 steps" in output
     assert [path.name for path in tmp_path.iterdir()] == ["small.safetensors"]
     assert train.main(arguments) == 0 and "nothing to resume" in capsys.readouterr().out
 

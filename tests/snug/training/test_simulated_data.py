@@ -39,11 +39,11 @@ def read(path: Path) -> tuple[list[Motion], dict[str, np.ndarray]]:
 def test_the_file_holds_motions_and_what_was_simulated(built):
     """From the pelvis, where networks learn, the vertices are those in memory to the bits of a float32."""
     motions, trajectories = read(built)
-    for motion, (given, positions) in zip(motions, simulations(), strict=True):
-        assert motion.name == given.name and np.array_equal(motion.poses, given.poses)
-        pelvis = tube_dress().pelvis(given)[:, None]
-        seen, stored = ((x - pelvis).astype(np.float32) for x in (positions, trajectories[motion.name]))
-        assert np.array_equal(seen, stored)
+    for motion, (stored_motion, positions) in zip(motions, simulations(), strict=True):
+        assert motion.name == stored_motion.name and np.array_equal(motion.poses, stored_motion.poses)
+        pelvis = tube_dress().pelvis(stored_motion)[:, None]
+        moved, stored = ((x - pelvis).astype(np.float32) for x in (positions, trajectories[motion.name]))
+        assert np.array_equal(moved, stored)
 
 
 @pytest.mark.parametrize(
@@ -64,12 +64,12 @@ def test_a_file_that_is_not_as_it_was_written_is_named(built, tmp_path, damage, 
 
 def test_the_command_learns_from_the_file(built, tmp_path, capsys, refused, monkeypatch):
     out = tmp_path / "m.safetensors"
-    given = ["--dataset", str(built), "--steps", "2", "-o", str(out), "--model", "supervised"]
-    refused("garment: tube there, tshirt here", train.main, [*given, "--vertices", "300"])
+    words = ["--dataset", str(built), "--steps", "2", "-o", str(out), "--model", "supervised"]
+    refused("garment: tube there, tshirt here", train.main, [*words, "--vertices", "300"])
     monkeypatch.setattr(train, "choose_garment", lambda options, body: tube_dress().garment)
-    assert train.main(given) == 0
-    shown = capsys.readouterr().out
-    assert out.is_file() and "3 motions" in shown and "recipe supervised, 54 frames" in shown
+    assert train.main(words) == 0
+    output = capsys.readouterr().out
+    assert out.is_file() and "3 motions" in output and "recipe supervised, 54 frames" in output
     text = tmp_path / "text.h5"
     text.write_text("no HDF5")
     for options, message in (

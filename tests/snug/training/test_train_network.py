@@ -38,14 +38,14 @@ def test_each_mixed_clip_has_a_body_of_its_own_and_given_motions_the_mean_one():
         return make_trainer(SHAPED, seed=seed).data
 
     mine, dressed = data(0), tube_dress()
-    drawn = mine.shapes[1:]
-    assert not mine.shapes[0].any() and len(drawn) == 6 and len(np.unique(drawn)) == drawn.size
-    assert 2.5 < np.abs(drawn).max() <= 3.0 and 0.2 < (drawn > 0).mean() < 0.8
-    assert np.array_equal(data(0).shapes, mine.shapes) and not np.isin(data(1).shapes[1:], drawn).any()
+    shapes = mine.shapes[1:]
+    assert not mine.shapes[0].any() and len(shapes) == 6 and len(np.unique(shapes)) == shapes.size
+    assert 2.5 < np.abs(shapes).max() <= 3.0 and 0.2 < (shapes > 0).mean() < 0.8
+    assert np.array_equal(data(0).shapes, mine.shapes) and not np.isin(data(1).shapes[1:], shapes).any()
     clips = augment([swaying(30)], SHAPED, vertices=dressed.vertices, seed=0)
     windows = np.array([4, np.flatnonzero(mine.starts == mine.first[3] + 7)[0]])
     batch = mine.batch(windows)
-    for row, (motion, betas, first) in enumerate([(swaying(30), None, 4), (clips[2], drawn[2], 7)]):
+    for row, (motion, betas, first) in enumerate([(swaying(30), None, 4), (clips[2], shapes[2], 7)]):
         now = slice(first, first + 3)
         assert torch.allclose(batch.rest[row, 0], dressed.rest(betas), atol=1e-6)
         assert torch.allclose(batch.transforms[row], dressed.transforms(motion.poses, betas)[now])
@@ -110,5 +110,5 @@ def test_test_clips_of_a_published_split_do_not_train(tmp_path, capsys):
 )
 def test_command_line_refuses_what_it_could_not_do(arguments, hint, refused, tmp_path):
     (tmp_path / "file").touch()
-    given = ["-o", str(tmp_path / "model.safetensors"), "--vertices", "200"]
-    refused(hint, main, [*given, *arguments.format(tmp_path).split()])
+    options = ["-o", str(tmp_path / "model.safetensors"), "--vertices", "200"]
+    refused(hint, main, [*options, *arguments.format(tmp_path).split()])

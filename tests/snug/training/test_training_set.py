@@ -69,8 +69,8 @@ def test_with_weights_that_stand_still_what_is_remembered_becomes_a_roll_out():
                 for frame in range(begin, end):
                     _, state = network(data.features[None, frame : frame + 1], state)
                     if (frame - begin) % 3 == 2:
-                        kept = trainer.hidden_states.states[:, frame]
-                        assert (kept - state[:, 0]).abs().max() < 1e-5 * state.abs().max()
+                        states = trainer.hidden_states.states[:, frame]
+                        assert (states - state[:, 0]).abs().max() < 1e-5 * state.abs().max()
         assert (
             trainer.hidden_states.states[:, first : first + 2].abs().max() == 0.0
         )  # these end no window

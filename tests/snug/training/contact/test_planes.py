@@ -45,7 +45,7 @@ def test_what_is_no_number_or_not_trusted_moves_no_anchor(kernels):
 
     def kept():
         now = (contact.cache.faces, contact.cache.barycentric)
-        return [torch.equal(torch.as_tensor(table), held) for table, held in zip(now, before)]
+        return [torch.equal(torch.as_tensor(table), copy) for table, copy in zip(now, before)]
 
     batch = trainer.data.batch(np.arange(4), None)
     posed = contact.bodies.pose(batch)
@@ -134,9 +134,9 @@ def test_nothing_is_propagated_to_a_frame_in_which_the_body_is_elsewhere(monkeyp
 def test_each_part_of_an_epoch_passes_over_all_motions():
     trainer = make_trainer(motions=[swaying(402)])
     count = len(trainer.data.starts)
-    drawn = np.concatenate([trainer.draw() for _ in range(count // trainer.windows)])
-    assert len(np.unique(drawn)) == len(drawn) == count
-    part = np.sort(drawn[: count // DEFAULT.even])
+    windows = np.concatenate([trainer.draw() for _ in range(count // trainer.windows)])
+    assert len(np.unique(windows)) == len(windows) == count
+    part = np.sort(windows[: count // DEFAULT.even])
     assert (np.diff(part) == DEFAULT.even).all()
 
 

@@ -40,12 +40,12 @@ def posed_batch(dtype=torch.float64, seed=0):
 @pytest.mark.parametrize("term", ["strain", "bending", "gravity"])
 def test_closed_form_backward_is_the_derivative_of_the_definition(term, dtype):
     dressed, x, *_ = posed_batch(dtype)
-    made = {E.name: E for E in (StretchStVK, BendHinge, Gravity)}[term](dressed.cloth)
+    energy = {E.name: E for E in (StretchStVK, BendHinge, Gravity)}[term](dressed.cloth)
     fast, slow = x.clone().requires_grad_(), x.double().requires_grad_()
     weight = torch.tensor([[1.0, -2.0, 0.5]])  # each configuration has its own factor from above
-    value = ClosedForm.apply(fast, made)
+    value = ClosedForm.apply(fast, energy)
     (value * weight).sum().backward()
-    exact = made.energy(slow).sum(-1)
+    exact = energy.energy(slow).sum(-1)
     (exact * weight).sum().backward()
     tolerance = 1e-10 if dtype == torch.float64 else 2e-4  # float32 of 1e-6 m on centimetre edges
     assert value.shape == (1, 3) and fast.grad.dtype == dtype
@@ -155,7 +155,7 @@ def test_energy_at_anchors_is_that_of_their_planes(recipe):
         lanes, rows = to_lanes(x[:, None]), np.arange(2)[:, None]
         gradients = np.zeros_like(lanes)
         values = anchors.energy(contact, lanes, gradients, frames[:, None], rows, skin_now, normals)
-        return (from_lanes(taken, 2, 1)[:, 0].numpy() for taken in (values, gradients))
+        return (from_lanes(array, 2, 1)[:, 0].numpy() for array in (values, gradients))
 
     values, gradients = energies()
     points, directions = planes_of(anchors, frames, np.arange(2), skin_now, normals)

@@ -23,10 +23,10 @@ WEIGHED = replace(
 def test_a_step_descends_by_the_distance_and_lambda_times_the_energies():
     """Its gradient is automatic differentiation's of the definitions; its terms are in cm^2 and J."""
     trainer = make_trainer(WEIGHED, "supervised", trajectories=SIMULATED)
-    drawn = np.arange(6)
-    trainer.draw, trainer.optimiser.step = lambda: drawn, lambda: None
-    means, batch = trainer.step(0), trainer.data.batch(drawn, None)
-    taken = [p.grad.clone() for p in trainer.network.parameters()]
+    windows = np.arange(6)
+    trainer.draw, trainer.optimiser.step = lambda: windows, lambda: None
+    means, batch = trainer.step(0), trainer.data.batch(windows, None)
+    gradients = [p.grad.clone() for p in trainer.network.parameters()]
     trainer.network.closed_form = False
     x = skin(trainer.network(batch.features)[0] + batch.rest, trainer.weights, batch.transforms)
     rows, *body = trainer.contact.bodies.pose(batch)
@@ -40,7 +40,7 @@ def test_a_step_descends_by_the_distance_and_lambda_times_the_energies():
     loss = (terms["vertices"] + 3.0 * (terms["strain"] + terms["collision"])).mean()
     for name, term in {"loss": loss, **terms}.items():
         assert means[name] == pytest.approx(term.mean().item(), rel=1e-3) and means[name] > 1e-3
-    for one, other in zip(taken, torch.autograd.grad(loss, list(trainer.network.parameters()))):
+    for one, other in zip(gradients, torch.autograd.grad(loss, list(trainer.network.parameters()))):
         assert other.norm() > 0 and (one - other).norm() < 2e-3 * other.norm()
 
 

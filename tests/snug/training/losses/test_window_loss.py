@@ -101,13 +101,13 @@ def loss_of(recipe: Recipe, *, copies: int, kernels: bool, frames: int) -> tuple
     ahead = np.zeros_like(behind)
     ahead[:, 2:] = behind[:, 2:] - behind[:, 1:-1]
     planes = tuple(torch.as_tensor(np.repeat(array, copies, 0)) for array in (points, direction))
-    given = torch.as_tensor(x).repeat_interleave(copies, 0).requires_grad_()
+    start = torch.as_tensor(x).repeat_interleave(copies, 0).requires_grad_()
     steps = (torch.as_tensor(np.repeat(a, copies, 0)).float() for a in (ahead, behind))
     loss = PhysicsLoss(dressed.cloth, recipe, dt=DT, kernels=kernels)
-    terms = loss(given, next(steps), planes, lag=next(steps))
+    terms = loss(start, next(steps), planes, lag=next(steps))
     total = sum(energy.mean() for energy in terms.values())
     total.backward()
-    return total.item(), given.grad * copies
+    return total.item(), start.grad * copies
 
 
 @pytest.mark.parametrize("frames", [3, 6])
