@@ -164,7 +164,7 @@ def build_long_motion(scene: Scene, assets: Assets, *, loop_frames: int = 0) -> 
 
 
 def repeat_both_ways(motion: Motion) -> Motion:
-    """Return the motion again and again, every second time backwards, for `FRAMES` frames or up to a round more.
+    """Return the motion again and again, every second time backwards, for `FRAMES` frames or a round more.
 
     Its last hundred frames show the same as its first.
     """

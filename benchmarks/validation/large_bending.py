@@ -5,7 +5,8 @@ gives the force at each of its points; integrated by scipy.
 
 Lateral buckling: a strip on edge, clamped at one end, gives way sideways under P = 4.0126 (EI GJ)^0.5 /
 L^2 at the other end (Michell 1899, Prandtl 1899), or 12.85 (EI GJ)^0.5 / L^2 spread evenly over the
-length (Timoshenko and Gere, Theory of Elastic Stability), as tested by Romero et al. (2021). Of a narrow strip of width b on equilateral triangles EI = D (1 - nu^2) b and GJ = 2 D (1 - nu) b.
+length (Timoshenko and Gere, Theory of Elastic Stability), as tested by Romero et al.
+(2021). Of a narrow strip of width b on equilateral triangles EI = D (1 - nu^2) b, GJ = 2 D (1 - nu) b.
 
 Slit annular plate (Sze, Liu and Lo 2004): clamped at one lip of the slit, the other lifted by a line
 load. Equilateral triangles are mapped to the annulus by exp, which is conformal. Such a plate has nu =
