@@ -105,7 +105,7 @@ FAULTS = (
     Fault("edges carry half as much again", "_samples", "np.repeat(cloth.areas / 3, 3), len(edges))",
           "np.repeat(cloth.areas / 2, 3), len(edges))"),
     Fault("half the contact stiffness", "_curvatures", "6.0 * stiffness", "3.0 * stiffness"),
-    Fault("friction of two thirds of the force", "ContactFriction._coulomb", "coefficient * 3 *",
+    Fault("friction of two thirds of the force", "ContactFriction._coulomb", "coefficient * power *",
           "coefficient * 2 *"),
     Fault("friction in proportion to slip", "_gradient", "(2 / h - y / (h * h))  #", "(1 / h)  #"),
     Fault("a first step without friction", "ContactFriction.prepare",
