@@ -56,7 +56,7 @@ SIZES = replace(
     sheet_cells=4, sheet_frames=6, cell_seconds=120.0, least_seconds=0.02, repeats=1,
 )  # fmt: skip
 PLACE_TOLERANCE = 1e-6  # [m] of a point in its place; times a frame's length in float32
-# Factor of the clock up to which the times of frames are believed.
+# Factor of the clock, and a microsecond, up to which the times of frames are believed.
 CLOCK_SLACK = 1.1
 DISPLACEMENT = 0.02  # of the mean edge, for the places at which derivatives are compared
 DERIVATIVE_TOLERANCE = 1e-4  # of a derivative along a direction

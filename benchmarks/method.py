@@ -226,5 +226,8 @@ class MethodEntry:
 
 def is_installed(package: str) -> bool:
     """Return whether a package can be imported; a mere folder of that name cannot."""
-    spec = importlib.util.find_spec(package.partition(".")[0])
+    try:
+        spec = importlib.util.find_spec(package)
+    except ModuleNotFoundError:  # what it is a part of
+        return False
     return spec is not None and spec.origin is not None

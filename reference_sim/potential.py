@@ -228,6 +228,7 @@ class Potential:
 
     def terms(self, x: np.ndarray) -> dict[str, float]:
         """Return the energy of each term [J] at x (V, 3) [m], by name."""
+        x = self.energies[0].check_positions(x)
         return {energy.name: energy.value_and_gradient(x)[0] for energy in self.energies}
 
     def value(self, x: np.ndarray) -> float:
@@ -240,8 +241,8 @@ class Potential:
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return both at once [J], [N]: they share most of their work."""
-        x, gradient = self.energies[0].start_gradient(x)
-        total = 0.0
+        x = self.energies[0].check_positions(x)
+        total, gradient = 0.0, np.zeros_like(x)
         for energy in self.energies:
             value, part = energy.value_and_gradient(x)
             total += value
@@ -277,7 +278,7 @@ class Potential:
 
     def hessian(self, x: np.ndarray) -> sp.csc_matrix:
         """Return second derivatives (3V, 3V) [N/m] at x (V, 3) [m], coordinates of a vertex side by side."""
-        x, _ = self.energies[0].start_gradient(x)
+        x = self.energies[0].check_positions(x)
         pattern = self.pattern(np.ones(self.cloth.vertex_count, dtype=bool))
         changing = pattern.hessians(x)
         pattern = pattern.widen(changing)

@@ -53,8 +53,8 @@ def find_losses(one: pd.DataFrame, other: pd.DataFrame) -> list[Change]:
     keys = [frame.set_index(CELL).index for frame in (one, other)]
     losses = one[one["usable"] & ~keys[0].isin(keys[1])].astype({"method": str, "metric": str})
     cells = losses.set_index(CELL[:3]).index
-    lacking = cells.isin(other.set_index(CELL[:3]).index)
-    losses["metric"] = losses["metric"].where(lacking, "all metrics")
+    present = cells.isin(other.set_index(CELL[:3]).index)
+    losses["metric"] = losses["metric"].where(present, "all metrics")
     # `endings` reports cells that were ok and failed.
     failed = other[~other["status"].isin(USABLE)].set_index(CELL[:3]).index
     losses = losses[~cells.isin(failed) | (losses["status"] != "ok")]

@@ -130,10 +130,10 @@ def split_words(text: str) -> tuple[str, dict[str, Any]]:
     ('shirt.obj', {'units': 'cm', 'shift': [0.0, 0.1, 0.0]})
     """
     path, *pairs = text.split(",")
-    words = list(map(_word, pairs))
-    if len(dict(words)) < len(words):
+    table = dict(map(_word, pairs))
+    if len(table) < len(pairs):
         raise ValueError(f"{text}: a word stands there twice: give each once")
-    return path.strip(), dict(words)
+    return path.strip(), table
 
 
 def _word(text: str) -> tuple[str, Any]:

@@ -90,7 +90,9 @@ def check_options(options: argparse.Namespace) -> None:
 def choose_garment(options: argparse.Namespace, body: Body) -> Garment:
     """Return the garment to train for, tailored or read. Raises ValueError."""
     if not is_garment_file(options.garment):
-        return find_template(options.garment).tailor(body, vertices=options.vertices or 1000)
+        return find_template(options.garment).tailor(
+            body, vertices=1000 if options.vertices is None else options.vertices
+        )
     if options.vertices is not None:
         raise ValueError(f"--vertices {options.vertices}: a mesh file has its own; leave it out")
     from snug.garments.reading import read_garment  # a tailored garment needs no reader of meshes
@@ -148,8 +150,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         minutes=CHECKPOINT_MINUTES, resume=options.resume,
     )  # fmt: skip
     if options.resume and out.is_file() and not checkpoint.path.is_file():
-        there = TrainedModel.load(out)
-        if (there.kind, there.seed, there.steps) != (options.model, options.seed, options.steps):
+        model = TrainedModel.load(out)
+        if (model.kind, model.seed, model.steps) != (options.model, options.seed, options.steps):
             raise ValueError(f"{out}: is of another training; delete it, or leave out --resume")
         print(f"{out}: is there, and no checkpoint beside it; nothing to resume")
         return 0
@@ -171,9 +173,8 @@ def print_summary(model: TrainedModel) -> None:
              if name not in ("step", "seconds")]  # fmt: skip
     print(f"recipe {model.recipe.name}, {model.summary['training_frames']} frames")
     print(f"last steps, {model.unit} (energies J), mean over frames: " + "  ".join(terms))
-    clipped = "gradient clipped"  # which is part of the recipe
-    windows = [window for window in model.summary["named_windows"] if window["action"] != clipped]
-    for window in windows[:5]:
+    windows = [w for w in model.summary["named_windows"] if w["action"] != "gradient clipped"]
+    for window in windows[:5]:  # to clip is part of the recipe
         print("step {step}: {window} at {joules} {unit}, {action}".format(**window, unit=model.unit))
     print(f"{model.steps} steps in {model.seconds:.0f} s after {model.setup_seconds:.0f} s of preparation, "
           f"{model.network.megabytes:.1f} MB")  # fmt: skip

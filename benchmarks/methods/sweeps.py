@@ -5,8 +5,9 @@ takes a Newton step of its own three coordinates, all others held still:
 
     x_i <- x_i - H_ii^-1 g_i,    g_i, H_ii: gradient and 3 x 3 block of the whole step's potential
 
-with H_ii made positive definite as in the simulator, so its stationary points are Newton's. There is no
-line search, as in the paper, and no guess or Chebyshev acceleration.
+with H_ii made positive definite as in the simulator (compressive stress and the hinge's second derivative
+left out), so its stationary points are Newton's. There is no line search, as in the paper, and no guess or
+Chebyshev acceleration.
 
 Extended position-based dynamics (Macklin et al. 2016) has constraints whose energies are ours, exactly.
 Each element is a constraint C(x) (a vector for the membrane) with energy C . K C / 2:

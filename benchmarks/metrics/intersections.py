@@ -22,9 +22,7 @@ if TYPE_CHECKING:
 SAMPLED_STEPS = 12  # pairs of consecutive frames that are looked at, evenly spread
 # No vertex moves as far beside the others in a frame, but one that is lost.
 FARTHEST = 1.0  # [m]
-MOST_PAIRS = (
-    200_000  # to be tested one by one, in seconds: lost cloths have more, and fine ones in motion
-)
+MOST_PAIRS = 200_000  # tested one by one, in seconds: lost cloths have more, and fine ones in motion
 
 
 def measure_triangles(roll_out: RollOut) -> dict[str, float]:

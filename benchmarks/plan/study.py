@@ -226,8 +226,8 @@ def locate(message: str, study: str, options: Sequence[str]) -> str:
 
     A field that the words of the command line give has none.
     """
-    words = (word.removeprefix("--set=").partition("=")[0] for word in options)
-    names = {word.lstrip("-").replace("-", "_") for word in words}
+    heads = (word.removeprefix("--set=").partition("=")[0] for word in options)
+    names = {head.lstrip("-").replace("-", "_") for head in heads}
     field = message.partition(":")[0]
     if field in names or not re.fullmatch(r"[\w.]+", field):
         return message
@@ -332,8 +332,8 @@ def _resolve(folder: Path, name: str, value: Any) -> Any:
 
 def _with_tables(table: Table) -> dict[str, Any]:
     """Return the fields with a table for each word that may stand in place of one."""
-    words = {n: {key: table[n]} for n, key in WORDS_FOR_TABLES.items() if isinstance(table.get(n), str)}
-    table = {**table, **words}
+    tables = {n: {key: table[n]} for n, key in WORDS_FOR_TABLES.items() if isinstance(table.get(n), str)}
+    table = {**table, **tables}
     if isinstance(files := table.get("rollouts"), Mapping):
         table["rollouts"] = {n: {"path": v} if isinstance(v, str) else v for n, v in files.items()}
     return table

@@ -119,9 +119,9 @@ def main(folder: str, copies: int, seed: int = 0) -> None:
     alarms, planted_counts, missed = 0, Counter[str](), Counter[str]()
     for done in range(1, copies + 1):
         copy = noisy.draw(random)
-        for change in (found := failures(run, copy)):
+        for change in (changes := failures(run, copy)):
             print(f"false alarm: {change}", flush=True)
-        alarms += bool(found)
+        alarms += bool(changes)
         name, place, worse = planted(copy, random)
         planted_counts[name] += 1
         if not failures(run, worse):

@@ -59,12 +59,14 @@ def main() -> None:
             )
     for motions in (8, 20):
         for factor in (1.0, 1.02, 1.1, 1.5, 2.0):
-            random, found = np.random.default_rng(7), Counter()
+            random, verdicts = np.random.default_rng(7), Counter()
             for _ in range(times // 4):
                 one, other = excesses(random, motions, 3, 1.0, factor)
                 far = effect(mean_of(one, "one"), mean_of(other, "other"), EXCESS)
-                found[decide(far, far.p_value())] += 1
-            print("verdict", motions, factor, {k: v / (times // 4) for k, v in found.items()}, flush=True)
+                verdicts[decide(far, far.p_value())] += 1
+            print(
+                "verdict", motions, factor, {k: v / (times // 4) for k, v in verdicts.items()}, flush=True
+            )
 
 
 if __name__ == "__main__":

@@ -97,15 +97,15 @@ class Training:
 
 def _of_session(leader: int) -> list[int]:
     """Return the processes of a session that have not ended."""
-    found = []
+    numbers = []
     for folder in Path("/proc").glob("[0-9]*"):
         try:
             state, _, _, session = (folder / "stat").read_text().rpartition(")")[2].split()[:4]
         except OSError:
             continue
         if int(session) == leader and state != "Z":
-            found.append(int(folder.name))
-    return found
+            numbers.append(int(folder.name))
+    return numbers
 
 
 def main(kills: int, seed: int = 0, interval: float = 3.0, steps: int = 1500) -> None:

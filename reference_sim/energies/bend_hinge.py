@@ -59,9 +59,9 @@ class BendHinge(Energy):
         self.stiffness = cloth.material.bending_stiffness * scale
         if isinstance(rest_angles, str) and rest_angles == "rest":
             rest_angles = dihedral_angles(cloth.rest_positions, self.stencils)
-        if not np.isfinite(np.asarray(rest_angles, np.float64)).all():
-            raise ValueError("BendHinge rest_angles: must be finite numbers [rad]")
         angles = np.broadcast_to(np.asarray(rest_angles, dtype=np.float64), (len(self.stencils),))
+        if not np.isfinite(angles).all():
+            raise ValueError("BendHinge rest_angles: must be finite numbers [rad]")
         self.rest_angles = np.array(angles)  # its own: a broadcast view is read-only
 
     def parameters(self) -> dict[str, Any]:
@@ -92,7 +92,8 @@ class BendHinge(Energy):
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
-        x, gradient = self.start_gradient(x)
+        x = self.check_positions(x)
+        gradient = np.zeros_like(x)
         return _gradient(x, self.stencils, self.stiffness, self.rest_angles, gradient), gradient
 
     def add_hessian(self, x: np.ndarray, convexity: float, places: BlockPlaces, data: np.ndarray) -> None:

@@ -110,20 +110,17 @@ class Energy:
         """
         return {"vertices": self.stencils}
 
-    def start_gradient(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return x (V, 3) as kernels take it, which look at no bounds, and a gradient of zeros to add to.
-
-        Raises ValueError for another shape.
-        """
+    def check_positions(self, x: np.ndarray) -> np.ndarray:
+        """Return x (V, 3) for kernels, which look at no bounds. Raises ValueError for another shape."""
         x = np.ascontiguousarray(x, dtype=np.float64)
         if x.shape != (shape := (self.cloth.vertex_count, 3)):
             raise ValueError(f"positions have shape {x.shape}: expected {shape} [m]")
-        return x, np.zeros_like(x)
+        return x
 
     def _elements(self, x: np.ndarray) -> Tensor:
         import torch
 
-        u = torch.as_tensor(np.asarray(x, dtype=np.float64)[self.stencils])
+        u = torch.as_tensor(self.check_positions(x)[self.stencils])
         return u.requires_grad_(True)
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:

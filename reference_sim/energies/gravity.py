@@ -59,7 +59,8 @@ class Gravity(Energy):
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
-        x, gradient = self.start_gradient(x)
+        x = self.check_positions(x)
+        gradient = np.zeros_like(x)
         gradient[:, 1] = self.weights
         return float(self.weights @ (x[:, 1] - self.origin_height)), gradient
 

@@ -75,7 +75,8 @@ class StretchStVK(Energy):
 
     def value_and_gradient(self, x: np.ndarray) -> tuple[float, np.ndarray]:
         """Return the sum of E [J] and its gradient (V, 3) [N] at x (V, 3) [m]."""
-        x, gradient = self.start_gradient(x)
+        x = self.check_positions(x)
+        gradient = np.zeros_like(x)
         value = _gradient(x, self.stencils, self.Dm_inverse, self.areas, self.lam, self.mu, gradient)
         return value, gradient
 

@@ -115,11 +115,9 @@ class Trainer:
             self.loss = PhysicsLoss(
                 self.dressed.cloth, recipe, dt=self.data.dt, device=self.device, kernels=self.kernels
             )
-            if "collision" not in recipe.terms:
-                pass
-            elif recipe.contact_samples == "nearest_vertices":
+            if "collision" in recipe.terms and recipe.contact_samples == "nearest_vertices":
                 self.nearest = NearestVertices(self.data)
-            else:
+            elif "collision" in recipe.terms:
                 self.contact = TrainingContact(
                     self.data, self.loss.contact, fixed=not self.shaped, kernels=self.kernels
                 )

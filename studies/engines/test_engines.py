@@ -183,7 +183,7 @@ def test_a_budget_that_is_not_near_says_how_far_the_last_two_are_apart_and_what_
         ({1: far, 4: run, 16: run}, "", (4, "")),
         ({1: far, 4: run, 16: run}, differ, (None, differ)),  # near the largest, which is not its limit
     ):
-        monkeypatch.setattr(audit, "ladder", lambda name, found=(budgets, remark): found)
+        monkeypatch.setattr(audit, "ladder", lambda name, answer=(budgets, remark): answer)
         assert audit.converged_budget.__wrapped__(engine) == expected
     assert audit.budgeted.__wrapped__(engine, 4, "distance") == (None, differ)
     for iterates, unit in ((True, "iterations a step"), (False, "steps a frame")):

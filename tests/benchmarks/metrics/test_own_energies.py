@@ -47,8 +47,8 @@ def excess(scene, simulations, name, positions):
     known = {other: x for other, x in simulations.items() if other != "at rest"}
     group = grouped(scene, known | {name: positions, "skinning": positions})
     group.quasi_static = at_rest
-    own, plain = group.roll_outs[-2:]
-    values = measure(own) or compare(own, group.reference)
+    trained, plain = group.roll_outs[-2:]
+    values = measure(trained) or compare(trained, group.reference)
     return values[NAME], compare(plain, group.reference)[NAME]
 
 
@@ -61,8 +61,8 @@ def test_the_minimiser_of_its_own_energies_leaves_a_network_no_excess(scene, sim
     reference = find_own_reference(entry)
     usual = "at rest" if find_energies(entry) == STATIC else "simulation"
     best = simulations[reference.name if reference else usual]
-    own, common = excess(scene, simulations, name, best)
-    assert own == pytest.approx(0.0, abs=1e-9)
+    value, common = excess(scene, simulations, name, best)
+    assert value == pytest.approx(0.0, abs=1e-9)
     if name in ("snug-paper", "pbns-springs"):  # another contact, other springs: no fault of a training
         assert common > 5.0
     shaken = best + 1e-3 * np.random.default_rng(0).standard_normal(best.shape)
