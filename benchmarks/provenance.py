@@ -26,7 +26,7 @@ from benchmarks.declarations import DeclarationError
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGES = (  # those that compute, or read what is computed with
-    "numpy", "scipy", "numba", "llvmlite", "torch", "h5py", "scikit-fem", "libigl", "cvxopt", "pymetis",
+    "numpy", "scipy", "numba", "llvmlite", "torch", "h5py", "scikit-fem", "libigl", "pymetis",
     "ipctk", "pyvista", "pyacvd", "pandas", "safetensors",
 )  # fmt: skip
 

@@ -1,86 +1,15 @@
-"""Sparse Cholesky factorisations: by a package, and a compiled one to be called in the middle of a step.
+"""Elimination of sparse symmetric matrices, and LDL^T of scalar ones, to be called in the middle of a step.
 
-The package is CHOLMOD through cvxopt (GPLv3) with METIS nested dissection; where cvxopt is missing, SuperLU
-from scipy, several times slower. The compiled one is LDL^T row by row (Davis 2005, "LDL: a concise sparse
-Cholesky factorization package"): row k of L solves a triangular system with the rows above it.
+The factor is found row by row (Davis 2005, "LDL: a concise sparse Cholesky factorization package"): row k
+of L solves a triangular system with the rows above it. Hessians have `supernodal.Cholesky`.
 """
 
 from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-import scipy.sparse.linalg as spla
 
 from reference_sim.kernels.kernel_cache import njit
-
-
-def analyse(indptr: np.ndarray, indices: np.ndarray, order: np.ndarray) -> CholmodSolver | SuperLUSolver:
-    """Analyse a lower-triangular CSC pattern, with the best package that is installed.
-
-    Entries above the diagonal are ignored. order (n,): fill-reducing, of rows and columns.
-    """
-    try:
-        return CholmodSolver(indptr, indices, order)
-    except ImportError:
-        return SuperLUSolver(indptr, indices, order)
-
-
-class CholmodSolver:
-    """Supernodal CHOLMOD through cvxopt."""
-
-    def __init__(self, indptr: np.ndarray, indices: np.ndarray, order: np.ndarray) -> None:
-        from cvxopt import cholmod, matrix, spmatrix
-
-        self._cholmod, self._matrix = cholmod, matrix
-        size = len(indptr) - 1
-        columns = np.repeat(np.arange(size), np.diff(indptr))
-        self._A = spmatrix(matrix(np.ones(len(columns))), matrix(indices), matrix(columns), (size, size))
-        self._symbolic = cholmod.symbolic(self._A, p=matrix(order.tolist()), uplo="L")
-
-    def factorise(self, values: np.ndarray) -> bool:
-        """Factorise the matrix with these values (nnz,); False if not positive definite."""
-        self._A.V = self._matrix(values)
-        try:
-            self._cholmod.numeric(self._A, self._symbolic)
-        except ArithmeticError:
-            return False
-        return True
-
-    def solve(self, b: np.ndarray) -> np.ndarray:
-        """Solve with the last factorisation: b (n,) or (n, k), same shape back."""
-        x = self._matrix(b)
-        self._cholmod.solve(self._symbolic, x)
-        return np.array(x).reshape(b.shape)
-
-
-class SuperLUSolver:
-    """SuperLU of scipy kept symmetric: no pivoting, and a negative pivot means not positive definite."""
-
-    def __init__(self, indptr: np.ndarray, indices: np.ndarray, order: np.ndarray) -> None:
-        self._indptr, self._indices, self._order = indptr, indices, order
-        self._lu: spla.SuperLU | None = None
-
-    def factorise(self, values: np.ndarray) -> bool:
-        """Factorise the matrix with these values (nnz,); False if not positive definite."""
-        A = symmetrise(values, self._indices, self._indptr)[self._order][:, self._order]
-        try:
-            lu = spla.splu(
-                A, permc_spec="NATURAL", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
-            )
-        except RuntimeError:  # exactly singular
-            return False
-        unpivoted = np.array_equal(lu.perm_r, np.arange(len(lu.perm_r)))
-        if not unpivoted or not (lu.U.diagonal() > 0).all():
-            return False
-        self._lu = lu
-        return True
-
-    def solve(self, b: np.ndarray) -> np.ndarray:
-        """Solve with the last factorisation: b (n,) or (n, k), same shape back."""
-        assert self._lu is not None, "factorise() first"
-        x = np.empty_like(b)
-        x[self._order] = self._lu.solve(b[self._order])
-        return x
 
 
 def symmetrise(values: np.ndarray, indices: np.ndarray, indptr: np.ndarray) -> sp.csc_matrix:
@@ -98,6 +27,64 @@ def nested_dissection(adjacency: sp.csr_matrix) -> np.ndarray:
     graph = pymetis.CSRAdjacency(adj_starts=adjacency.indptr, adjacent=adjacency.indices)
     permutation, _ = pymetis.nested_dissection(adjacency=graph)
     return np.asarray(permutation, dtype=np.int64)
+
+
+def eliminate(order: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Return what elimination in this order (n,) does to a graph with these pairs (m, 2) of vertices.
+
+    Vertices are numbered in that order from here on: starts (n + 1,) and columns (m,) of the rows of the
+    lower matrix, without its diagonal; parents (n,) in the elimination tree, -1 at a root; counts (n,) of
+    numbers below the diagonal in the columns of the factor.
+    """
+    count = len(order)
+    moved = np.sort(invert(order)[pairs], axis=1)
+    row, columns = np.divmod(np.sort(moved[:, 1] * count + moved[:, 0]), max(count, 1))
+    starts = np.searchsorted(row, np.arange(count + 1))
+    parents, counts = np.full(count, -1), np.zeros(count, np.int64)
+    _find_parents(starts, columns, parents, counts)
+    return starts, columns, parents, counts
+
+
+def invert(order: np.ndarray) -> np.ndarray:
+    """Return the place (n,) of each number in an order (n,)."""
+    place = np.empty(len(order), np.int64)
+    place[order] = np.arange(len(order))
+    return place
+
+
+@njit(cache=True)
+def _find_parents(starts, columns, parents, counts):
+    """Walk up the elimination tree from each entry, and build it on the way."""
+    mark = np.full(len(parents), -1)
+    for k in range(len(parents)):
+        mark[k] = k
+        for p in range(starts[k], starts[k + 1]):
+            i = columns[p]
+            while mark[i] != k:
+                mark[i] = k
+                if parents[i] < 0:
+                    parents[i] = k
+                counts[i] += 1
+                i = parents[i]
+
+
+@njit(cache=True)
+def find_rows(starts, columns, node, parents, places, rows):
+    """Write the rows of the factor's columns into `rows` from places (m,) on, in ascending order.
+
+    node (n,): which of m groups of columns one belongs to, of which the rows below the group are written.
+    parents (m,): of groups.
+    """
+    mark = np.full(len(parents), -1)
+    for k in range(len(starts) - 1):
+        mark[node[k]] = k
+        for p in range(starts[k], starts[k + 1]):
+            i = node[columns[p]]
+            while mark[i] != k:
+                mark[i] = k
+                rows[places[i]] = k
+                places[i] += 1
+                i = parents[i]
 
 
 RIGHT_SIDES = 4  # numbers a row of right sides: x, y, z and one to fill the lane
@@ -122,21 +109,19 @@ class ScalarPattern:
         ones = np.ones(len(pair))
         lower = sp.csr_matrix((ones, (pair[:, 1], pair[:, 0])), shape=(count, count))
         self.order = np.asarray(nested_dissection((lower + lower.T).tocsr()), np.int64)
-        self._place = np.empty(count, np.int64)
-        self._place[self.order] = np.arange(count)
-        moved = np.sort(self._place[pair], axis=1)
-        rows = np.lexsort((moved[:, 0], moved[:, 1]))
-        self._keys = moved[rows, 1] * count + moved[rows, 0]
-        self.row_columns = np.ascontiguousarray(moved[rows, 0])
-        self.row_starts = np.searchsorted(moved[rows, 1], np.arange(count + 1))
-        self.factor_rows, self.factor_columns = _find_rows(self.row_starts, self.row_columns)
-        by_rows = (np.ones(len(self.factor_columns)), self.factor_columns, self.factor_rows)
-        by_columns = sp.csr_matrix(by_rows, shape=(count, count)).tocsc()
-        self.starts, self.rows = by_columns.indptr.astype(np.int64), by_columns.indices
+        self._place = invert(self.order)
+        self.row_starts, columns, parents, counts = eliminate(self.order, pair)
+        self._keys = np.repeat(np.arange(count), np.diff(self.row_starts)) * count + columns
+        self.starts = np.append(0, np.cumsum(counts))
+        rows = np.empty(self.starts[-1], np.int64)
+        find_rows(self.row_starts, columns, np.arange(count), parents, self.starts[:-1].copy(), rows)
+        by_columns = sp.csc_matrix((np.ones(len(rows)), rows, self.starts), shape=(count, count))
+        by_rows = by_columns.tocsr()  # ascending: a column after those that it depends on
+        self.factor_rows = by_rows.indptr.astype(np.int64)
         # A signed index is first asked whether it counts from the end: a quarter of a factorisation's
         # time.
         self.row_columns, self.factor_columns, self.rows = (
-            columns.astype(np.uint32) for columns in (self.row_columns, self.factor_columns, self.rows)
+            numbers.astype(np.uint32) for numbers in (columns, by_rows.indices, rows)
         )
 
     def places(self, stencils: np.ndarray) -> np.ndarray:
@@ -153,40 +138,6 @@ class ScalarPattern:
         k = np.arange(stencils.shape[1])
         upper_of_same = (row == column) & (k[:, None] != k[None, :])
         return np.where((row < column) | (row < 0) | (column < 0) | upper_of_same, -1, place)
-
-
-def _find_rows(starts: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the rows of L, found in two passes: first their lengths."""
-    count = len(starts) - 1
-    lengths = np.zeros(count + 1, np.int64)
-    _row_patterns(starts, columns, lengths, np.empty(0, np.int64))
-    factor_rows = np.cumsum(lengths)
-    factor_columns = np.empty(factor_rows[-1], np.int64)
-    _row_patterns(starts, columns, factor_rows.copy(), factor_columns)
-    # Ascending: a column after those that it depends on.
-    rows = np.repeat(np.arange(count), np.diff(factor_rows))
-    return factor_rows, factor_columns[np.lexsort((factor_columns, rows))]
-
-
-@njit(cache=True)
-def _row_patterns(starts, columns, row, out):
-    """Walk up the elimination tree from each entry: row[k + 1] counts, or out is filled from row[k] on."""
-    count = len(starts) - 1
-    parent, mark = np.full(count, -1), np.full(count, -1)
-    for k in range(count):
-        mark[k], place = k, row[k]
-        for p in range(starts[k], starts[k + 1]):
-            i = columns[p]
-            while mark[i] != k:
-                mark[i] = k
-                if parent[i] < 0:
-                    parent[i] = k
-                if len(out):
-                    out[place] = i
-                    place += 1
-                else:
-                    row[k + 1] += 1
-                i = parent[i]
 
 
 @njit(cache=True, error_model="numpy")

@@ -24,6 +24,7 @@ from typing import Any
 import numpy as np
 from llvmlite import ir
 from numba import types
+from numba.core import cgutils
 from numba.extending import intrinsic
 
 from reference_sim.kernels.fast_kernels import LANES
@@ -187,7 +188,7 @@ def copy_lanes(_: Any, source: Any, i: Any, target: Any, j: Any) -> Any:
 
     A row has LANES numbers of float32, or LANES_FLOAT64.
     """
-    lanes = LANES_FLOAT64 if source.dtype == types.float64 else LANES
+    lanes = _lanes(source)
 
     def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         source_row = _place(context, builder, signature.args[:2], args[:2], lanes, lanes)
@@ -224,14 +225,11 @@ def mix_rows(_: Any, rows: Any, i: Any, j: Any, k: Any, u: Any, v: Any, w: Any) 
     """
 
     def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        four, total = ir.VectorType(ir.FloatType(), 4), None
+        total = None
         for row, weight, kind in zip(args[1:4], args[4:], signature.args[1:4]):
             place = _place(context, builder, (rows, kind), (args[0], row), 3, 4)
             numbers = builder.load(place, align=4)
-            spread = ir.Constant(four, ir.Undefined)
-            for lane in range(4):
-                spread = builder.insert_element(spread, weight, ir.IntType(32)(lane))
-            term = builder.fmul(spread, numbers, flags=("contract",))
+            term = builder.fmul(_spread(builder, weight, 4), numbers, flags=("contract",))
             total = term if total is None else builder.fadd(total, term, flags=("contract",))
         parts = [builder.extract_element(total, ir.IntType(32)(n)) for n in range(3)]
         return context.make_tuple(builder, signature.return_type, parts)
@@ -249,13 +247,92 @@ def bits_at_most(_: Any, rows: Any, i: Any, limit: Any) -> Any:
     def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
         place = _place(context, builder, signature.args[:2], args[:2], LANES, LANES)
         numbers = builder.load(place, align=4)
-        limits = ir.Constant(numbers.type, ir.Undefined)
-        for lane in range(LANES):
-            limits = builder.insert_element(limits, args[2], ir.IntType(32)(lane))
-        within = builder.fcmp_unordered("<=", numbers, limits)
+        within = builder.fcmp_unordered("<=", numbers, _spread(builder, args[2], LANES))
         return builder.zext(builder.bitcast(within, ir.IntType(LANES)), WIDE)
 
     return types.int64(rows, i, types.float32), build
+
+
+TILE_ROWS = 3  # with two vectors a row, and what is multiplied, they fill the 16 registers of AVX2
+
+
+@_intrinsic(prefer_literal=True)
+def subtract_product(
+    _: Any, C: Any, c: Any, c_stride: Any, P: Any, p: Any, q: Any, p_stride: Any, count: Any, vectors: Any
+) -> Any:
+    """Subtract a product of two parts of P, flat like C and of one dtype, from a tile of C.
+
+    C[c + a c_stride + b] -= sum over k < count of P[p + k p_stride + a] P[q + k p_stride + b], for a <
+    TILE_ROWS and b < vectors (a literal) times LANES, or LANES_FLOAT64.
+    """
+    lanes, width = _lanes(C), range(vectors.literal_value)
+
+    def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        c, c_stride, p, q, p_stride, count = (args[k] for k in (1, 2, 4, 5, 6, 7))
+        numbers = context.make_array(P)(context, builder, args[3]).data
+        tile = []  # row, number of the vector in it, its place and its register
+        for a in range(TILE_ROWS):
+            row = builder.add(c, builder.mul(c_stride, WIDE(a)))
+            for v in width:
+                at = builder.add(row, WIDE(v * lanes))
+                place = _place(context, builder, (C, types.intp), (args[0], at), 1, lanes)
+                register = cgutils.alloca_once(builder, place.type.pointee)
+                builder.store(builder.load(place, align=4), register)
+                tile.append((a, v, place, register))
+        with cgutils.for_range(builder, count) as loop:
+            row = builder.mul(loop.index, p_stride)
+            left, right = builder.add(p, row), builder.add(q, row)
+            starts = [builder.add(right, WIDE(v * lanes)) for v in width]
+            places = [_place(context, builder, (P, types.intp), (args[3], at), 1, lanes) for at in starts]
+            loaded = [builder.load(place, align=4) for place in places]
+            for a, v, _, register in tile:
+                factor = builder.load(builder.gep(numbers, [builder.add(left, WIDE(a))]))
+                spread = _spread(builder, builder.fneg(factor), lanes)
+                product = builder.fmul(spread, loaded[v], flags=("contract",))
+                total = builder.fadd(builder.load(register), product, flags=("contract",))
+                builder.store(total, register)
+        for _, _, place, register in tile:
+            builder.store(builder.load(register), place, align=4)
+        return context.get_dummy_value()
+
+    i = types.intp
+    return types.void(C, i, i, P, i, i, i, i, vectors), build
+
+
+@_intrinsic
+def add_run(_: Any, source: Any, i: Any, target: Any, j: Any, count: Any) -> Any:
+    """Add `count` numbers of source from i on to target from j on, flat arrays of one dtype.
+
+    What lies in the last vector beyond them is read, and in target written as it was.
+    """
+    lanes = _lanes(source)
+
+    def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        with cgutils.for_range_slice(builder, WIDE(0), args[4], WIDE(lanes), WIDE) as (at, _):
+            ends = [(args[0], builder.add(args[1], at)), (args[2], builder.add(args[3], at))]
+            first, second = (
+                _place(context, builder, (source, types.intp), end, 1, lanes) for end in ends
+            )
+            number = ir.Constant(ir.VectorType(WIDE, lanes), list(range(lanes)))
+            inside = builder.icmp_signed("<", number, _spread(builder, builder.sub(args[4], at), lanes))
+            zeros = ir.Constant(first.type.pointee, [0.0] * lanes)
+            numbers = builder.select(inside, builder.load(first, align=4), zeros)
+            builder.store(builder.fadd(builder.load(second, align=4), numbers), second, align=4)
+        return context.get_dummy_value()
+
+    return types.void(source, types.intp, target, types.intp, types.intp), build
+
+
+def _lanes(array: Any) -> int:
+    return LANES_FLOAT64 if array.dtype == types.float64 else LANES
+
+
+def _spread(builder: Any, number: Any, lanes: int) -> Any:
+    """Return a vector with the same number in all lanes."""
+    vector = ir.Constant(ir.VectorType(number.type, lanes), ir.Undefined)
+    for lane in range(lanes):
+        vector = builder.insert_element(vector, number, ir.IntType(32)(lane))
+    return vector
 
 
 @_intrinsic

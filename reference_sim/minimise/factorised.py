@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reference_sim.cholesky import analyse
 from reference_sim.minimise.descent import Stop, dot, mean_weight
 from reference_sim.potential import Potential
+from reference_sim.supernodal import Cholesky
 
 if TYPE_CHECKING:
     from reference_sim.minimise.newton import NewtonRun
@@ -36,7 +36,7 @@ class FactorisedHessian:
 
     def _analyse(self) -> None:
         pattern = self._pattern
-        self._solver = analyse(pattern.indptr, pattern.indices, pattern.order)
+        self._solver = Cholesky(pattern.indptr, pattern.indices, pattern.order, pattern.block)
 
     def start_again(self) -> None:
         """Go back to the pattern without what dynamic terms have added."""
@@ -54,12 +54,12 @@ class FactorisedHessian:
             self._analyse()
         return pattern.assemble(x, changing, convexity=convexity)
 
-    def factorise(self, values: np.ndarray, shift: float | np.ndarray) -> bool:
-        """Factorise the values plus shift M/dt^2; False if that is not positive definite."""
+    def factorise(self, values: np.ndarray, shift: float | np.ndarray, kind: type = np.float64) -> bool:
+        """Factorise the values plus shift M/dt^2 as this kind of number; False as `Cholesky.factorise`."""
         if np.any(shift):
             values = values.copy()
             values[self._pattern.diagonal] += shift * self.metric
-        return self._solver.factorise(values)
+        return self._solver.factorise(values, kind=kind)
 
     def solve(self, b: np.ndarray) -> np.ndarray:
         """Solve with the last factorisation: b (3n,)."""

@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from reference_sim.cholesky import analyse
 from reference_sim.energies.energy import demand_positive
 from reference_sim.kernels.fast_kernels import terms_without_kernel, warn_slow_path
 from reference_sim.minimise.descent import (
@@ -30,6 +29,7 @@ from reference_sim.minimise.descent import (
 )
 from reference_sim.minimise.newton import Newton
 from reference_sim.potential import Potential
+from reference_sim.supernodal import Cholesky
 
 if TYPE_CHECKING:
     from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS
@@ -176,7 +176,7 @@ class ScalarPreconditioner:
     def __init__(self, potential: Potential) -> None:
         free = potential.cloth.free
         self._pattern = potential.pattern(free, block=1)
-        self.solver = analyse(self._pattern.indptr, self._pattern.indices, self._pattern.order)
+        self.solver = Cholesky(self._pattern.indptr, self._pattern.indices, self._pattern.order)
         self._floor = FLOOR * potential.cloth.masses[free] * 30**2
 
     def assemble(self, x: np.ndarray) -> np.ndarray:

@@ -154,6 +154,8 @@ class NewtonRun(Descent):
         super().__init__(newton.potential, x, after=after)
         self.newton, self.hessian = newton, newton.hessian
         self.factorised = False  # whether the last factorisation exists, to solve with
+        # Of factorisations for directions: quasi-Newton steps make up for what float32 rounds.
+        self.kind: type = np.float32 if newton.reuse and not newton.hessian.static else np.float64
         self.values = np.empty(0)  # (nnz,) of the Hessian for the next step
         self.target = newton.tolerance  # relative residual that counts as converged at the last Hessian
         self.quasi_newton_steps = self.iterations
@@ -169,10 +171,15 @@ class NewtonRun(Descent):
         with np.errstate(all="ignore"):
             return self.hessian.assemble(self.x, convexity)
 
-    def factorise(self, values: np.ndarray, shift: float | np.ndarray) -> bool:
-        """Factorise, as the Hessian does, and count it; False if not positive definite."""
-        self.factorised = self.hessian.factorise(values, shift)
+    def factorise(self, values: np.ndarray, shift: float | np.ndarray, kind: type = np.float64) -> bool:
+        """Factorise, as the Hessian does, and count it; False if not positive definite.
+
+        In float32 only until that fails where float64 does not.
+        """
+        self.factorised = self.hessian.factorise(values, shift, kind)
         self.factorisations += 1
+        if kind is np.float32 and not self.factorised and self.factorise(values, shift):
+            self.kind = np.float64
         return self.factorised
 
     def first_projection(self) -> int:
@@ -240,7 +247,7 @@ class NewtonRun(Descent):
         shift = 0.0
         # A singular Hessian, as of cloth that may move rigidly, needs no projection. Inertia excludes it.
         while not self.factorise(
-            values, shift or (self.hessian.tiny_shift(values) if self.hessian.static else 0.0)
+            values, shift or (self.hessian.tiny_shift(values) if self.hessian.static else 0.0), self.kind
         ):
             if projection + 1 < len(CONVEXITY):
                 projection += 1

@@ -1,4 +1,4 @@
-"""The simulator by itself: no heavy package that it does not need, no need of cvxopt."""
+"""The simulator by itself: no heavy package that it does not need."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ UNNEEDED = (
 # A sheet that a rising tetrahedron lifts, with friction, into a file.
 SIMULATION = """
 import sys
-sys.modules.update(dict.fromkeys(sys.argv[2:]))
 import numpy as np
 from reference_sim import Cloth, Obstacle, simulate
 from reference_sim.energies import BendHinge, ContactFriction, ContactPenalty, Gravity, StretchStVK
@@ -39,18 +38,11 @@ print(*sorted(name.split(".")[0] for name, module in sys.modules.items() if modu
 """
 
 
-def test_a_simulation_loads_no_more_than_it_needs_and_without_cvxopt_ends_at_the_same_place(tmp_path):
-    """cvxopt is under the GPL: whoever leaves it out gets the same result, more slowly."""
-    results = []
-    for absent in ((), ("cvxopt",)):
-        path = tmp_path / f"{len(absent)}.vtkhdf"
-        command = [sys.executable, "-c", SIMULATION, str(path), *absent]
-        process = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
-        assert process.returncode == 0, process.stderr
-        loaded = set(process.stdout.split())
-        assert {"numba", "h5py"} < loaded and loaded.isdisjoint((*absent, *UNNEEDED))
-        results.append(Trajectory.load(path))
-    first, other = (result.positions for result in results)
-    assert np.ptp(first[:, :, 1]) > 0.01
-    # A residual of 1e-10 vertex weights, against a stiffness of at least m/dt^2: 1e-12 m a frame.
-    assert np.abs(other - first).max() < 1e-10
+def test_a_simulation_loads_no_more_than_it_needs(tmp_path):
+    path = tmp_path / "sheet.vtkhdf"
+    command = [sys.executable, "-c", SIMULATION, str(path)]
+    process = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert process.returncode == 0, process.stderr
+    loaded = set(process.stdout.split())
+    assert {"numba", "h5py"} < loaded and loaded.isdisjoint(UNNEEDED)
+    assert np.ptp(Trajectory.load(path).positions[:, :, 1]) > 0.01

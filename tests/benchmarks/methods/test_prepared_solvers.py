@@ -23,8 +23,8 @@ SOLVERS = (
     "xpbd-40",
 )  # fmt: skip
 SET_UP = (  # what analyses a pattern
-    (potential, "nested_dissection"), (cholesky, "nested_dissection"), (factorised, "analyse"),
-    (lbfgs, "analyse"), (sweeps, "incidence"),
+    (potential, "nested_dissection"), (cholesky, "nested_dissection"), (factorised, "Cholesky"),
+    (lbfgs, "Cholesky"), (sweeps, "incidence"),
 )  # fmt: skip
 
 
