@@ -35,7 +35,7 @@ EXAMPLES = """examples:
 
 A study that is published by the present code is left: in several sittings the same command does one after
   another, each to be committed as it comes. Each run goes on where it was stopped, in a folder of its own
-  below --out: what is not timed may be run there before, by benchmarks.run with more workers or on a cluster.
+  below --out: what is not timed may be run there before, by benchmarks.run with more workers.
   When it has ended well, its rows, tables, PDF, pictures and films that the documents show replace those in
   reports/published. Times want a machine with nothing beside.
 Then: python -m reports.docs writes the tables of README and docs from them.

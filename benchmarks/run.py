@@ -43,7 +43,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
             retry=options.retry,
             fresh=options.fresh,
             workers=options.workers,
-            scheduler=options.scheduler or "",
             command=shlex.join(["python", "-m", PROGRAM, *typed]),
         )
     except ValueError as error:  # also the readers' own: each is one line with file and remedy
@@ -70,10 +69,6 @@ def carry_out(plan: Plan, *, dry_run: bool = False) -> int:
         return 0
     from benchmarks.runner.isolated_process import LOADED_BY_DRESSED, start_loading
 
-    if plan.scheduler:
-        from benchmarks.runner.cluster import check_scheduler  # loads dask
-
-        check_scheduler(plan.scheduler)
     announce_compilation()
     dressed = bool(plan.scenes) and all(scene.dressed for scene in plan.scenes)
     start_loading(*(LOADED_BY_DRESSED if dressed else ()))

@@ -1,196 +1,304 @@
-"""Elimination of sparse symmetric matrices, and LDL^T of scalar ones, to be called in the middle of a step.
+"""Sparse Cholesky factorisation P A P^T = L L^T, by fronts.
 
-The factor is found row by row (Davis 2005, "LDL: a concise sparse Cholesky factorization package"): row k
-of L solves a triangular system with the rows above it. Hessians have `supernodal.Cholesky`.
+The numbers of a supernode (reference_sim.elimination) form one dense panel. Each supernode has a front (Duff
+and Reid 1983, "The multifrontal solution of indefinite sparse symmetric linear equations"): its panel, and
+what that subtracts from the rows below it, which is added to the front of the parent in the elimination
+tree.
 """
 
 from __future__ import annotations
 
+from collections import namedtuple
+
 import numpy as np
-import scipy.sparse as sp
 
+from reference_sim.elimination import supernodes
 from reference_sim.kernels.kernel_cache import njit
+from reference_sim.kernels.lanes import LANES, LANES_FLOAT64, TILE_ROWS, add_run, subtract_product
+
+BLOCK = 24  # rows of a panel that are subtracted from at once
+# A pivot below this share of the diagonal has lost too many digits in float32.
+LEAST_FLOAT32 = 1e-4
+
+# Of each supernode: columns, rows below, stride and start of its panel and of what it subtracts, parent,
+# first and last of its runs, and start of its unknowns.
+FIELDS = (
+    "width", "rank", "stride", "panel", "update_stride", "update", "parent", "run", "run_end", "start",
+)  # fmt: skip
+FRONT = np.dtype([(name, np.int64) for name in FIELDS])
+# Places of a matrix's values, -1 where they are ignored; fronts (m,) of FRONT; runs (first, end, place) of
+# rows below, which are one in the parent's front, too; places of the diagonal of columns that fill a panel
+# up to TILE_ROWS; numbers of all fronts' unknowns, n for those columns.
+Layout = namedtuple("Layout", "places fronts runs fillers unknowns")
+Room = namedtuple("Room", "L updates work")
 
 
-def symmetrise(values: np.ndarray, indices: np.ndarray, indptr: np.ndarray) -> sp.csc_matrix:
-    """Return the whole symmetric (n, n) matrix of a lower one, whose diagonal blocks are stored whole."""
-    lower = sp.tril(sp.csc_matrix((values, indices, indptr)), format="csc")
-    return sp.csc_matrix(lower + sp.tril(lower, -1).T)
+class Cholesky:
+    """Factorisation of symmetric matrices of one pattern, in float64, or in float32 where that serves.
 
+    Args:
+        indptr, indices: CSC structure of the lower n x n matrix; entries above the diagonal are ignored.
+        order: (n,) fill-reducing.
 
-def nested_dissection(adjacency: sp.csr_matrix) -> np.ndarray:
-    """Return a fill-reducing order (n,) of a vertex graph by METIS."""
-    if adjacency.shape[0] < 4:
-        return np.arange(adjacency.shape[0])
-    import pymetis
+    Example: eigenvalues are 3 and 1.
 
-    graph = pymetis.CSRAdjacency(adj_starts=adjacency.indptr, adjacent=adjacency.indices)
-    permutation, _ = pymetis.nested_dissection(adjacency=graph)
-    return np.asarray(permutation, dtype=np.int64)
-
-
-def eliminate(order: np.ndarray, pairs: np.ndarray) -> tuple[np.ndarray, ...]:
-    """Return what elimination in this order (n,) does to a graph with these pairs (m, 2) of vertices.
-
-    Vertices are numbered in that order from here on: starts (n + 1,) and columns (m,) of the rows of the
-    lower matrix, without its diagonal; parents (n,) in the elimination tree, -1 at a root; counts (n,) of
-    numbers below the diagonal in the columns of the factor.
-    """
-    count = len(order)
-    moved = np.sort(invert(order)[pairs], axis=1)
-    row, columns = np.divmod(np.sort(moved[:, 1] * count + moved[:, 0]), max(count, 1))
-    starts = np.searchsorted(row, np.arange(count + 1))
-    parents, counts = np.full(count, -1), np.zeros(count, np.int64)
-    _find_parents(starts, columns, parents, counts)
-    return starts, columns, parents, counts
-
-
-def invert(order: np.ndarray) -> np.ndarray:
-    """Return the place (n,) of each number in an order (n,)."""
-    place = np.empty(len(order), np.int64)
-    place[order] = np.arange(len(order))
-    return place
-
-
-@njit(cache=True)
-def _find_parents(starts, columns, parents, counts):
-    """Walk up the elimination tree from each entry, and build it on the way."""
-    mark = np.full(len(parents), -1)
-    for k in range(len(parents)):
-        mark[k] = k
-        for p in range(starts[k], starts[k + 1]):
-            i = columns[p]
-            while mark[i] != k:
-                mark[i] = k
-                if parents[i] < 0:
-                    parents[i] = k
-                counts[i] += 1
-                i = parents[i]
-
-
-@njit(cache=True)
-def find_rows(starts, columns, node, parents, places, rows):
-    """Write the rows of the factor's columns into `rows` from places (m,) on, in ascending order.
-
-    node (n,): which of m groups of columns one belongs to, of which the rows below the group are written.
-    parents (m,): of groups.
-    """
-    mark = np.full(len(parents), -1)
-    for k in range(len(starts) - 1):
-        mark[node[k]] = k
-        for p in range(starts[k], starts[k + 1]):
-            i = node[columns[p]]
-            while mark[i] != k:
-                mark[i] = k
-                rows[places[i]] = k
-                places[i] += 1
-                i = parents[i]
-
-
-RIGHT_SIDES = 4  # numbers a row of right sides: x, y, z and one to fill the lane
-
-
-class ScalarPattern:
-    """Pattern of a symmetric n x n matrix that elements with stencils (E, k) add up to; -1 is pinned.
-
-    Row i of the factor is row order[i] of the matrix. row_starts (n + 1,), row_columns: entries left of
-    its diagonal. factor_rows, factor_columns: those of L, by rows; starts, rows: those by columns.
+        >>> import numpy as np
+        >>> from reference_sim.cholesky import Cholesky
+        >>> cholesky = Cholesky(np.array([0, 2, 3]), np.array([0, 1, 1]), np.array([1, 0]))
+        >>> cholesky.factorise(np.array([2.0, 1.0, 2.0]))
+        True
+        >>> cholesky.solve(np.array([3.0, 3.0])).round(12)
+        array([1., 1.])
+        >>> cholesky.factorise(np.array([2.0, 3.0, 2.0]))  # eigenvalues 5 and -1
+        False
     """
 
-    def __init__(self, count: int, stencils: list[np.ndarray]) -> None:
-        self.count = count
-        pairs = [np.zeros((0, 2), np.int64)]
-        for stencil in stencils:
-            k = stencil.shape[1]
-            ends = stencil[:, [(a, b) for a in range(k) for b in range(a)]].reshape(-1, 2)
-            pairs.append(ends[(ends >= 0).all(axis=1) & (ends[:, 0] != ends[:, 1])])
-        ends = np.sort(np.concatenate(pairs), axis=1)
-        pair = np.stack(np.divmod(np.unique(ends[:, 0] * count + ends[:, 1]), count), axis=1)
-        ones = np.ones(len(pair))
-        lower = sp.csr_matrix((ones, (pair[:, 1], pair[:, 0])), shape=(count, count))
-        self.order = np.asarray(nested_dissection((lower + lower.T).tocsr()), np.int64)
-        self._place = invert(self.order)
-        self.row_starts, columns, parents, counts = eliminate(self.order, pair)
-        self._keys = np.repeat(np.arange(count), np.diff(self.row_starts)) * count + columns
-        self.starts = np.append(0, np.cumsum(counts))
-        rows = np.empty(self.starts[-1], np.int64)
-        find_rows(self.row_starts, columns, np.arange(count), parents, self.starts[:-1].copy(), rows)
-        by_columns = sp.csc_matrix((np.ones(len(rows)), rows, self.starts), shape=(count, count))
-        by_rows = by_columns.tocsr()  # ascending: a column after those that it depends on
-        self.factor_rows = by_rows.indptr.astype(np.int64)
-        # A signed index is first asked whether it counts from the end: a quarter of a factorisation's
-        # time.
-        self.row_columns, self.factor_columns, self.rows = (
-            numbers.astype(np.uint32) for numbers in (columns, by_rows.indices, rows)
-        )
+    def __init__(self, indptr: np.ndarray, indices: np.ndarray, order: np.ndarray) -> None:
+        count = len(order)
+        entries = np.stack([indices, np.repeat(np.arange(count), np.diff(indptr))], axis=1)
+        stored = entries[:, 0] >= entries[:, 1]
+        order, first, above, below, rows = supernodes(order, entries[entries[:, 0] > entries[:, 1]])
+        spans, ranks = np.diff(first), np.diff(below)
+        # Columns and rows of each front; columns without a number fill it up.
+        widths = -(-spans // TILE_ROWS) * TILE_ROWS
+        begin = np.append(0, np.cumsum(widths + ranks))
+        front = np.repeat(np.arange(len(spans)), widths + ranks)
+        within = np.arange(len(front)) - begin[front]
+        numbers = np.full(len(front), -1)
+        numbers[within < spans[front]] = np.arange(count)
+        numbers[within >= widths[front]] = rows
+        named = np.flatnonzero(numbers >= 0)
+        keys = front[named] * count + numbers[named]
 
-    def places(self, stencils: np.ndarray) -> np.ndarray:
-        """Return where (E, k, k) the entries of the elements' matrices are added.
+        def local(fronts: np.ndarray, numbers: np.ndarray) -> np.ndarray:
+            """Return the places (k,) of numbers (k,) in fronts (k,)."""
+            return within[named[np.searchsorted(keys, fronts * count + numbers)]]
 
-        It is -1 for those above the diagonal, of pinned vertices, and of an element that has a vertex
-        twice.
+        strides, update_strides = _pad(widths + ranks), _pad(ranks)
+        panels = np.append(0, np.cumsum(widths * strides))
+        updates, room = _two_stacks(above, (ranks + TILE_ROWS) * update_strides)
+        node = np.repeat(np.arange(len(spans)), ranks)
+        target = local(above[node], rows)
+        head = np.ones(len(rows), bool)
+        head[1:] = (np.diff(target) != 1) | (np.diff(node) != 0)
+        head = np.flatnonzero(head)
+        start = head - below[node[head]]
+        runs = np.stack([start, start + np.diff(np.append(head, len(rows))), target[head]], axis=1)
+        run_ends = np.searchsorted(node[head], np.arange(len(spans)), side="right")
+        fronts = np.zeros(len(spans), FRONT)
+        fields = (
+            widths, ranks, strides, panels[:-1], update_strides, updates, above,
+            np.append(0, run_ends)[:-1], run_ends, begin[:-1],
+        )  # fmt: skip
+        for name, field in zip(FIELDS, fields):
+            fronts[name] = field
+        low, high = np.sort(np.argsort(order)[entries[stored]], axis=1).T
+        places = np.full(len(indices), -1)
+        s = np.repeat(np.arange(len(spans)), spans)[low]
+        places[stored] = panels[s] + (low - first[s]) * strides[s] + local(s, high)
+        filler = np.flatnonzero(numbers < 0)
+        fillers = panels[front[filler]] + within[filler] * (strides[front[filler]] + 1)
+        self.layout = Layout(places, fronts, runs, fillers, np.append(order, count)[numbers])
+        sizes = panels[-1], room, (widths + ranks).max(initial=0)
+        self._sizes = tuple(size + 2 * LANES for size in sizes)  # a vector may reach beyond the end
+        self._rooms: dict[type, Room] = {}
+        self._kind: type = np.float64
+
+    def room(self, kind: type) -> Room:
+        """Return the room for the factor in this kind of number."""
+        if kind not in self._rooms:
+            self._rooms[kind] = Room(*(np.zeros(size, kind) for size in self._sizes))
+        return self._rooms[kind]
+
+    def factorise(self, values: np.ndarray, *, kind: type = np.float64) -> bool:
+        """Factorise the matrix with these values (nnz,).
+
+        Returns False if it is not positive definite; in np.float32 also if it is so nearly singular that
+        seven digits do not suffice.
         """
-        i = np.append(self._place, -1)[stencils]
-        row, column = np.broadcast_arrays(i[:, :, None], i[:, None, :])
-        key = row * self.count + column
-        place = np.searchsorted(self._keys, np.where(row > column, key, 0))
-        place = np.where(row > column, place, len(self._keys) + row)
-        k = np.arange(stencils.shape[1])
-        upper_of_same = (row == column) & (k[:, None] != k[None, :])
-        return np.where((row < column) | (row < 0) | (column < 0) | upper_of_same, -1, place)
+        self._kind = kind
+        least = kind(LEAST_FLOAT32 if kind is np.float32 else 0.0)
+        return factorise(values, self.layout, self.room(kind), least)
+
+    def solve(self, b: np.ndarray) -> np.ndarray:
+        """Solve with the last factorisation: b (n,) or (n, k), same shape back."""
+        x = np.zeros((*b.shape[1:], len(b) + 1), self._kind)
+        x[..., :-1] = b.T
+        for row in x.reshape(-1, len(b) + 1):
+            solve(self.layout, self.room(self._kind), row)
+        return x[..., :-1].T.astype(np.float64)
+
+
+def _pad(numbers: np.ndarray) -> np.ndarray:
+    """Return strides of rows of so many numbers, of which a vector may begin at any."""
+    return -(-numbers // LANES) * LANES + LANES
+
+
+def _two_stacks(parents: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, int]:
+    """Return where (m,) nodes of a forest, in such an order, keep so much until their parent has taken it.
+
+    A node keeps it on one of two stacks, its parent on the other. The room for both comes second.
+    """
+    sides, places = np.zeros((2, len(parents)), np.int64)
+    for node in np.flatnonzero(parents >= 0)[::-1]:
+        sides[node] = 1 - sides[parents[node]]
+    waiting: list[int] = []
+    tops, rooms = np.zeros((2, 2), np.int64)
+    for node, side in enumerate(sides):
+        places[node] = tops[side]
+        tops[side] += sizes[node]
+        rooms[side] = max(rooms[side], tops[side])
+        while waiting and parents[waiting[-1]] == node:
+            tops[1 - side] -= sizes[waiting.pop()]
+        waiting.append(node)
+    return places + rooms[0] * sides, rooms.sum()
+
+
+@njit(cache=True)
+def _clear(x):
+    for i in range(len(x)):
+        x[i] = 0.0
+
+
+@njit(cache=True)
+def _subtract(C, c, c_stride, P, p, p_stride, count, rows, columns):
+    """Subtract P^T P from the upper triangle of C: of P `count` rows, of C `rows`, of both `columns`."""
+    lanes = LANES_FLOAT64 if C.itemsize == 8 else LANES
+    for i in range(0, columns, 2 * lanes):
+        for a in range(0, min(rows, i + 2 * lanes), TILE_ROWS):
+            if columns - i > lanes:
+                subtract_product(C, c + a * c_stride + i, c_stride, P, p + a, p + i, p_stride, count, 2)
+            else:
+                subtract_product(C, c + a * c_stride + i, c_stride, P, p + a, p + i, p_stride, count, 1)
+
+
+@njit(cache=True, inline="always")
+def _add_update(front, parent, runs, L, updates):
+    """Add what a front subtracts to that of its parent."""
+    for p in range(front.run, front.run_end):
+        for a in range(runs[p, 0], runs[p, 1]):
+            row, source = runs[p, 2] + a - runs[p, 0], front.update + a * front.update_stride
+            for q in range(p, front.run_end):
+                first = max(runs[q, 0], a)
+                column, length = runs[q, 2] + first - runs[q, 0], runs[q, 1] - first
+                if row < parent.width:
+                    add_run(
+                        updates, source + first, L, parent.panel + row * parent.stride + column, length
+                    )
+                else:
+                    target = parent.update + (row - parent.width) * parent.update_stride
+                    add_run(updates, source + first, updates, target + column - parent.width, length)
 
 
 @njit(cache=True, error_model="numpy")
-def factorise(
-    values, row_starts, row_columns, factor_rows, factor_columns, starts, rows, L, D, y, filled
-):
-    """Write L (by columns) and D (n,) of the matrix with these values; False if a pivot is not positive.
+def factorise(values, layout, room, least):
+    """Write the rows of the panels of L^T, with inverses on the diagonal; False at a pivot that is too small.
 
-    y (n,) zeros and filled (n,): room to work in.
+    least: the smallest pivot, as a share of the matrix's diagonal.
     """
-    count, off = len(D), len(row_columns)
-    for k in range(count):
-        filled[k] = starts[k]
-        for p in range(row_starts[k], row_starts[k + 1]):
-            y[row_columns[p]] = values[p]
-        pivot = values[off + k]
-        for q in range(factor_rows[k], factor_rows[k + 1]):
-            i = factor_columns[q]
-            value = y[i]
-            y[i] = 0.0
-            end = filled[i]
-            for p in range(starts[i], end):
-                y[rows[p]] -= L[p] * value
-            share = value / D[i]
-            pivot -= share * value
-            L[end] = share
-            filled[i] = end + 1
-        if not pivot > 0.0:
-            y[:] = 0.0
-            return False
-        D[k] = pivot
+    fronts, L, updates, work = layout.fronts, room.L, room.updates, room.work
+    _clear(L)
+    for i in range(len(values)):
+        if layout.places[i] >= 0:
+            L[layout.places[i]] += values[i]
+    for i in layout.fillers:
+        L[i] = 1.0
+    waiting, count = np.empty(len(fronts), np.int64), 0  # fronts before that of their parent
+    for s in range(len(fronts)):
+        front = fronts[s]
+        width, rank, stride, update = front.width, front.rank, front.stride, front.update
+        _clear(updates[update : update + rank * front.update_stride])
+        for j in range(width):
+            work[j] = least * L[front.panel + j * (stride + 1)]
+        while count and fronts[waiting[count - 1]].parent == s:
+            count -= 1
+            _add_update(fronts[waiting[count]], front, layout.runs, L, updates)
+        for begin in range(0, width, BLOCK):
+            end, column = min(begin + BLOCK, width), front.panel + begin
+            at = column + begin * stride
+            _subtract(L, at, stride, L, column, stride, begin, end - begin, width + rank - begin)
+            for j in range(begin, end, TILE_ROWS):
+                row, length = front.panel + j * (stride + 1), width + rank - j
+                _subtract(
+                    L, row, stride, L, at + j - begin, stride, j - begin, min(TILE_ROWS, length), length
+                )
+                if not _eliminate(L, row, stride, length, work, j):
+                    return False
+        below = front.panel + width
+        _subtract(updates, update, front.update_stride, L, below, stride, width, rank, rank)
+        waiting[count] = s
+        count += 1
     return True
 
 
-@njit(cache=True, error_model="numpy", fastmath={"contract"})
-def solve(starts, rows, L, D, b):
-    """Replace b (n, RIGHT_SIDES), in the factor's order, by the solution."""
-    count = len(D)
-    for j in range(count):
-        b0, b1, b2, b3 = b[j, 0], b[j, 1], b[j, 2], b[j, 3]
-        for p in range(starts[j], starts[j + 1]):
-            i, share = rows[p], L[p]
-            b[i, 0] -= share * b0
-            b[i, 1] -= share * b1
-            b[i, 2] -= share * b2
-            b[i, 3] -= share * b3
-    for j in range(count - 1, -1, -1):
-        inverse = 1.0 / D[j]
-        b0, b1, b2, b3 = b[j, 0] * inverse, b[j, 1] * inverse, b[j, 2] * inverse, b[j, 3] * inverse
-        for p in range(starts[j], starts[j + 1]):
-            i, share = rows[p], L[p]
-            b0 -= share * b[i, 0]
-            b1 -= share * b[i, 1]
-            b2 -= share * b[i, 2]
-            b3 -= share * b[i, 3]
-        b[j, 0], b[j, 1], b[j, 2], b[j, 3] = b0, b1, b2, b3
+@njit(cache=True, inline="always", error_model="numpy")
+def _eliminate(L, start, stride, length, least, j):
+    """Eliminate TILE_ROWS rows of a panel, from their diagonal on; False at a pivot that is too small."""
+    for a in range(TILE_ROWS):
+        row = L[start + a * stride + a : start + a * stride + length]
+        if not row[0] > least[j + a]:
+            return False
+        inverse = L.dtype.type(1.0 / np.sqrt(row[0]))
+        for i in range(len(row)):
+            row[i] *= inverse
+        for b in range(a + 1, TILE_ROWS):
+            source = row[b - a :]
+            target = L[start + b * stride + b : start + b * stride + length]
+            share = source[0]
+            for i in range(len(source)):
+                target[i] -= share * source[i]
+        row[0] = inverse
+    return True
+
+
+@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
+def solve(layout, room, b):
+    """Replace b (n + 1,), whose last number is 0, by the solution."""
+    fronts, L, work, count = layout.fronts, room.L, room.work, len(layout.fronts)
+    for step in range(2 * count):
+        front = fronts[min(step, 2 * count - 1 - step)]
+        width, stride, changed = front.width, front.stride, front.width + front.rank
+        numbers = layout.unknowns[front.start : front.start + changed]
+        x = work[: len(numbers)]
+        for i in range(len(numbers)):
+            x[i] = b[numbers[i]]
+        if step < count:
+            for j in range(0, width, TILE_ROWS):
+                _solve_down(L, front.panel + j * (stride + 1), stride, x[j:])
+        else:
+            changed = width
+            for j in range(width - TILE_ROWS, -1, -TILE_ROWS):
+                _solve_up(L, front.panel + j * (stride + 1), stride, x[j:])
+        for i in range(changed):
+            b[numbers[i]] = x[i]
+
+
+@njit(cache=True, inline="always", fastmath={"contract", "reassoc", "nsz"})
+def _solve_down(L, start, stride, b):
+    """Solve for the first TILE_ROWS numbers of b with rows of L^T from `start` on; subtract from the rest."""
+    second, third = start + stride, start + 2 * stride
+    x = b[0] * L[start]
+    y = (b[1] - L[start + 1] * x) * L[second + 1]
+    z = (b[2] - L[start + 2] * x - L[second + 2] * y) * L[third + 2]
+    b[0], b[1], b[2] = x, y, z
+    rest, end = b[3:], len(b)
+    u, v, w = L[start + 3 : start + end], L[second + 3 : second + end], L[third + 3 : third + end]
+    for i in range(len(rest)):
+        rest[i] -= u[i] * x + v[i] * y + w[i] * z
+
+
+@njit(cache=True, inline="always", fastmath={"contract", "reassoc", "nsz"})
+def _solve_up(L, start, stride, b):
+    """Solve for the first TILE_ROWS numbers of b where the rest is solved for."""
+    second, third = start + stride, start + 2 * stride
+    rest, end = b[3:], len(b)
+    u, v, w = L[start + 3 : start + end], L[second + 3 : second + end], L[third + 3 : third + end]
+    x = y = z = L.dtype.type(0.0)
+    for i in range(len(rest)):
+        x += u[i] * rest[i]
+        y += v[i] * rest[i]
+        z += w[i] * rest[i]
+    z = (b[2] - z) * L[third + 2]
+    y = (b[1] - y - L[second + 2] * z) * L[second + 1]
+    x = (b[0] - x - L[start + 1] * y - L[start + 2] * z) * L[start]
+    b[0], b[1], b[2] = x, y, z

@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 
-from reference_sim.cholesky import nested_dissection, symmetrise
+from reference_sim.elimination import nested_dissection
 from reference_sim.energies.energy import Energy, Step
 from reference_sim.kernels.kernel_cache import njit
 from reference_sim.kernels.lanes import BlockPlaces
@@ -45,7 +45,7 @@ class HessianPattern:
         key = np.unique(np.concatenate([np.arange(n) * (n + 1), *map(np.unique, of_terms)]))
         key = key[key >= 0]  # -1 stands for a pinned vertex or the upper triangle
         self._number = number
-        self._slots = [np.where(keys < 0, -1, np.searchsorted(key, keys)) for keys in of_terms]
+        self.slots = [np.where(keys < 0, -1, np.searchsorted(key, keys)) for keys in of_terms]
         self._fixed = self
         self._lay_out(key)
 
@@ -89,11 +89,11 @@ class HessianPattern:
         if len(spare) < SPARE_BLOCKS * len(blocks):
             blocks = np.union1d(spare, blocks)
         wider = copy.copy(self._fixed)
-        for cached in ("order", "_constant"):
+        for cached in ("order", "constant"):
             wider.__dict__.pop(cached, None)
         key = np.union1d(self._fixed._key, blocks)
         moved = np.append(np.searchsorted(key, self._fixed._key), -1)  # slot -1, not stored, stays -1
-        wider._slots = [moved[slots] for slots in self._fixed._slots]
+        wider.slots = [moved[slots] for slots in self._fixed.slots]
         wider._lay_out(key)
         return wider
 
@@ -121,8 +121,8 @@ class HessianPattern:
         changing: Hessians of the dynamic terms at x (V, 3), which this pattern must cover. convexity: see
         Energy.active_hessian_blocks.
         """
-        values = self._constant.copy()
-        for energy, slots in zip(self.energies, self._slots):
+        values = self.constant.copy()
+        for energy, slots in zip(self.energies, self.slots):
             if not (energy.dynamic or self.block in energy.constant):
                 self._add_term(energy, slots, x, convexity, values)
         for matrix in changing:
@@ -130,10 +130,10 @@ class HessianPattern:
         return values
 
     @cached_property
-    def _constant(self) -> np.ndarray:
+    def constant(self) -> np.ndarray:
         """(nnz,) values of the terms that give the same everywhere."""
         values, anywhere = np.zeros(len(self.indices)), np.zeros((len(self._number), 3))
-        for energy, slots in zip(self.energies, self._slots):
+        for energy, slots in zip(self.energies, self.slots):
             if self.block in energy.constant:
                 self._add_term(energy, slots, anywhere, 0.0, values)
         return values
@@ -155,7 +155,8 @@ class HessianPattern:
 
     def symmetrise(self, values: np.ndarray) -> sp.csc_matrix:
         """Return the whole symmetric (3n, 3n) matrix."""
-        return symmetrise(values, self.indices, self.indptr)
+        lower = sp.tril(sp.csc_matrix((values, self.indices, self.indptr)), format="csc")
+        return sp.csc_matrix(lower + sp.tril(lower, -1).T)
 
 
 def _block_keys(stencils: np.ndarray, n: int) -> np.ndarray:

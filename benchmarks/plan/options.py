@@ -76,9 +76,6 @@ def make_parser() -> argparse.ArgumentParser:
     add("--workers", type=int, metavar="N",
         help="parallel processes for work that is not timed (default 2, or the number of cores if less); "
         "timed methods run alone")  # fmt: skip
-    add("--scheduler", metavar="ADDRESS",
-        help="a cluster of dask.distributed, as tcp://HOST:8786, for work that is not timed; timed methods "
-        "run here (docs/scale.md)")  # fmt: skip
     add("--list", nargs="?", const="", metavar="WORD",
         help="list studies, scenes, methods and motions with this word in their names; without a word, an "
         "overview; run nothing")  # fmt: skip

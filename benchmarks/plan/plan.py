@@ -70,9 +70,8 @@ class Plan:
 
     metrics: modules of metrics not the project's, see benchmarks.plan.user_files. inputs: the
     user's files, as read. retry: whether tasks that have failed are done again; fresh: all that the
-    folder holds is forgotten first. workers: processes side by side where nothing is timed. scheduler:
-    address of a cluster that does what is not timed; empty: this machine does. Raises StudyError where
-    two cells have the files of one: slashes of names become hyphens there.
+    folder holds is forgotten first. workers: processes side by side where nothing is timed. Raises
+    StudyError where two cells have the files of one: slashes of names become hyphens there.
     """
 
     study: Study
@@ -86,7 +85,6 @@ class Plan:
     retry: bool = False
     fresh: bool = False
     workers: int = 1
-    scheduler: str = ""
 
     def __post_init__(self) -> None:
         cell_of: dict[str, Cell] = {}
@@ -192,7 +190,6 @@ def make_plan(
     *,
     folder: Path | None = None,
     workers: int | None = None,
-    scheduler: str = "",
     scenes: Sequence[Scene] = (),
     **fields: Any,
 ) -> Plan:
@@ -210,7 +207,7 @@ def make_plan(
     ['flag']
     """
     folder = choose_folder(folder)
-    check_machines(study, folder, scheduler)
+    check_machine(study, folder)
     workers = min(WORKERS, usable_cores()) if workers is None else workers
     if workers < 1:
         raise StudyError(f"--workers {workers}: give a whole number, 1 or more")
@@ -225,7 +222,6 @@ def make_plan(
         inputs=scope.inputs,
         folder=folder,
         workers=workers,
-        scheduler=scheduler,
         **fields,
     )
 
@@ -274,11 +270,8 @@ def choose_metrics(study: Study) -> tuple[str, ...]:
     return homes
 
 
-def check_machines(study: Study, folder: Path, scheduler: str) -> None:
-    """Raise ValueError for an absent device, for networks of no folder, or of the run's own.
-
-    Where a cluster works, also for what this machine alone has.
-    """
+def check_machine(study: Study, folder: Path) -> None:
+    """Raise ValueError for an absent device, for networks of no folder, or of the run's own."""
     if study.device == "cuda":
         from snug.training.device import find_device  # loads torch
 
@@ -289,10 +282,6 @@ def check_machines(study: Study, folder: Path, scheduler: str) -> None:
     # where networks of another training are removed
     if trained and trained.resolve() == folder.resolve():
         raise StudyError(f"trained: {trained}: the folder of this run itself: give another by --out")
-    for name, value in (("rollouts", study.rollouts), ("trained", trained), ("device", study.device)):
-        if scheduler and value and value != "cpu":
-            fault = f"{name}: a cluster has the cpu, and no file of this machine"
-            raise StudyError(f"{fault}; leave out --scheduler")
 
 
 def choose_folder(folder: Path | None) -> Path:

@@ -37,7 +37,7 @@ def execute(plan: Plan, assets: Assets | None = None) -> int:
     """Run the plan, with its assets where they have been made; then make its report.
 
     Returns 0 when all ended well, 1 when something failed or there is no report. Raises RunRefused where
-    the plan's cluster is gone, or no network in the files that it names is of its meshes and motions.
+    no network in the files that the plan names is of its meshes and motions.
     """
     tasks = tasks_of(plan)
     networks = [task for task in tasks if task.kind == "network"]
@@ -51,12 +51,7 @@ def execute(plan: Plan, assets: Assets | None = None) -> int:
             assets = log.open_assets(assets)
         except ValueError as error:  # all dressed scenes fail, for the same reason; the others go on
             runner.refuse(("start", "data", "clips", "network"), one_line(error))
-    cluster = None
-    if plan.scheduler:
-        from benchmarks.runner.cluster import Cluster  # loads dask
-
-        cluster = Cluster(log.folder, assets, plan.scheduler)
-    runner.run(Executor(log.folder, assets, plan.workers, cluster))
+    runner.run(Executor(log.folder, assets, plan.workers))
     rows = rows_of(plan, runner.tasks, runner.outcomes)
     log.write_rows(rows)
     log.note_outcomes(runner)
@@ -189,7 +184,7 @@ def describe(plan: Plan) -> str:
         f"preset {study.sizes.name}: {study.sizes.description}",
         f"folder {plan.folder}",
         f"parts {', '.join(study.parts)}; seeds {', '.join(map(str, study.seeds))}; device {study.device}; "
-        f"{plan.scheduler or f'{plan.workers} workers'}, timed cells alone here",
+        f"{plan.workers} workers, timed cells alone here",
         *(str(file.path) for file in (plan.inputs.body, plan.inputs.garment) if file),
         f"{len(plan.cells)} cells, {skipped} skipped, {len(plan.cases)} cases",
     ]

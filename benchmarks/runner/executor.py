@@ -1,4 +1,4 @@
-"""Executor of tasks: untimed ones side by side, here or on a cluster; timed ones alone here."""
+"""Executor of tasks: untimed ones side by side, timed ones alone."""
 
 from __future__ import annotations
 
@@ -6,71 +6,41 @@ import queue
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor, wait
-from typing import TYPE_CHECKING
 
 from benchmarks.assets import Assets
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.isolated_process import TaskProcess
 from benchmarks.runner.task import Needed, Outcome, Task
 
-if TYPE_CHECKING:
-    from benchmarks.runner.cluster import Cluster
-
 POLL = 0.2  # [s] between looks at what has ended
-MOST = 4096  # threads of this process, each of which waits for a worker
 
 Batch = tuple[Sequence[Task], Needed]
 Done = tuple[Task, Outcome]
 
 
-class LocalProcesses:
-    """Single-threaded processes of this machine, of which `slots` are at work side by side.
+class Executor:
+    """Executes tasks whose needs are there; outcomes come in any order.
 
-    They stay for the next batch, which loads and compiles nothing again. A cluster has the same methods.
+    Untimed tasks are done by single-threaded processes, of which `workers` are at work side by side; they
+    stay for the next batch, which loads and compiles nothing again. Nothing is at work beside a timed task.
     """
 
-    def __init__(self, folder: RunFolder, assets: Assets | None, slots: int) -> None:
-        self._known, self.slots = (folder, assets), slots
+    def __init__(self, folder: RunFolder, assets: Assets | None, workers: int) -> None:
+        self.folder, self.assets, self.workers = folder, assets, workers
+        self._named: dict[str, TaskProcess] = {}
         self._all: list[TaskProcess] = []
         self._idle: list[TaskProcess] = []
 
-    def do(self, tasks: Sequence[Task], outcomes: Needed) -> Iterator[Outcome]:
+    def _do(self, tasks: Sequence[Task], outcomes: Needed) -> Iterator[Outcome]:
         """Yield the outcomes of a batch, done by one process; called by several threads."""
         try:
             process = self._idle.pop()
         except IndexError:  # none is idle, or another thread was first
-            process = TaskProcess(*self._known)
+            process = TaskProcess(self.folder, self.assets)
             self._all.append(process)
         for task in tasks:
             yield process.do(task, outcomes)
         self._idle.append(process)
-
-    def stop(self) -> None:
-        """Kill all processes, from another thread."""
-        for process in self._all:
-            process.stop()
-
-    def rest(self) -> None:
-        """End all processes, none of which is at work; others begin where needed."""
-        while self._all:
-            self._all.pop().close()
-        self._idle.clear()
-
-    close = rest
-
-
-class Executor:
-    """Executes tasks whose needs are there; outcomes come in any order.
-
-    Nothing is at work beside a timed task.
-    """
-
-    def __init__(
-        self, folder: RunFolder, assets: Assets | None, workers: int, cluster: Cluster | None = None
-    ) -> None:
-        self.folder, self.assets = folder, assets
-        self.back_end = cluster or LocalProcesses(folder, assets, workers)
-        self._named: dict[str, TaskProcess] = {}
 
     def together(self, ready: Callable[[], Batch | None]) -> Iterator[Done]:
         """Do batches of untimed tasks, some side by side, until none is at work or ready.
@@ -81,19 +51,19 @@ class Executor:
         stopped = threading.Event()
 
         def do(tasks: Sequence[Task], outcomes: Needed) -> None:
-            for outcome, task in zip(self.back_end.do(tasks, outcomes), tasks):
+            for outcome, task in zip(self._do(tasks, outcomes), tasks):
                 if stopped.is_set():  # the process was killed at it
                     return
                 finished.put((task, outcome))
 
         at_work: set[Future[None]] = set()
-        with ThreadPoolExecutor(MOST) as threads:
+        with ThreadPoolExecutor(self.workers) as threads:
             try:
                 while True:
                     for future in [future for future in at_work if future.done()]:
                         future.result()
                         at_work.remove(future)
-                    while len(at_work) < self.back_end.slots and (batch := ready()):
+                    while len(at_work) < self.workers and (batch := ready()):
                         at_work.add(threads.submit(do, *batch))
                     try:
                         result = finished.get(timeout=POLL if at_work else 0.0)
@@ -105,13 +75,16 @@ class Executor:
             except BaseException as error:
                 stopped.set()
                 while at_work := {f for f in at_work if not (f.cancel() or f.done())}:
-                    self.back_end.stop()
+                    for process in self._all:
+                        process.stop()
                     wait(at_work, timeout=POLL)
                 while not (finished.empty() or isinstance(error, GeneratorExit)):
                     yield finished.get()  # what was finished by then is kept
                 raise
             finally:
-                self.back_end.rest()
+                while self._all:  # none is at work; others begin where needed
+                    self._all.pop().close()
+                self._idle.clear()
 
     def run_alone(self, task: Task, outcomes: Needed) -> Outcome:
         """Return the outcome of a timed task, done alone in the process that it names."""
@@ -127,6 +100,5 @@ class Executor:
 
     def close(self) -> None:
         """End all processes."""
-        self.back_end.close()
         for name in list(self._named):
             self.release(name)

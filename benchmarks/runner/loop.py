@@ -39,7 +39,7 @@ class Runner:
         """Do all tasks: untimed ones side by side until others wait for the timed, one by one."""
         unknown = [task for task in self.tasks if task.id not in self.outcomes]
         try:
-            with Progress(unknown, executor.back_end.slots) as self.progress:
+            with Progress(unknown, executor.workers) as self.progress:
                 while rest := [task for task in unknown if task.id not in self.outcomes]:
                     tasks = _able(rest, timed=False) or _able(rest, timed=True)
                     (self._run_alone if tasks[0].process else self._side_by_side)(tasks, executor)

@@ -29,7 +29,7 @@ from benchmarks.methods.declared_networks import TRAININGS
 from benchmarks.methods.warm_started import make_guess
 from benchmarks.references import find_in_package
 from benchmarks.timing import one_thread
-from reference_sim import cholesky, obstacle, potential
+from reference_sim import obstacle, potential
 from reference_sim.energies import BendHinge, ContactPenalty, Gravity, StretchStVK
 from reference_sim.minimise import compiled_lbfgs
 from reference_sim.time_loop import State, TimeStepper
@@ -119,7 +119,7 @@ def clocked(owner, name, spent):
 
 def print_parts():
     """Print milliseconds a frame and calls of each part of the simulated frames, and of the rest."""
-    from reference_sim.supernodal import Cholesky  # not in every old tree
+    from reference_sim.cholesky import Cholesky  # not in every old tree
 
     parts = (
         ("contact planes", obstacle.Obstacle, "planes"),
@@ -161,6 +161,8 @@ def least(run, repeats=20):
 
 def print_bounds():
     """Print the bounds of a factorisation, a solve and an evaluation in float32."""
+    from reference_sim.elimination import eliminate  # not in every old tree
+
     rates = {}
     for kind in (np.float64, np.float32):
         square = np.ones((1024, 1024), kind)
@@ -170,8 +172,13 @@ def print_bounds():
     )
     for vertices in FRAMES:
         cloth = dressed_body(vertices).garment.cloth()
-        pattern = cholesky.ScalarPattern(cloth.vertex_count, [cloth.faces, cloth.hinges])
-        columns = 3.0 * (np.diff(pattern.starts) + 0.5)  # of the 3n factor, three alike
+        terms = [StretchStVK(cloth), BendHinge(cloth)]
+        pattern = potential.HessianPattern(terms, np.ones(cloth.vertex_count, bool), block=1)
+        ends = np.stack(
+            [pattern.indices, np.repeat(np.arange(len(pattern.order)), np.diff(pattern.indptr))]
+        )
+        counts = eliminate(pattern.order, ends.T[ends[0] > ends[1]])[3]
+        columns = 3.0 * (counts + 0.5)  # of the 3n factor, three alike
         numbers = int(3 * columns.sum())
         a, b = np.ones((2, numbers // 2))
         counts = dict(

@@ -178,7 +178,7 @@ def _hessian(x, hinges, stiffness, rest, convexity, slots, base, stride, data):
 
     but for antisymmetric parts that cancel between both faces.
     """
-    L, count = LANES_FLOAT64, len(hinges)
+    L, count, corners = LANES_FLOAT64, len(hinges), hinges.shape[1]
     u, blocks = np.empty(55 * L), np.empty(90 * L)
     for begin in range(0, count, L):
         for n in range(L):
@@ -222,7 +222,7 @@ def _hessian(x, hinges, stiffness, rest, convexity, slots, base, stride, data):
             for b in range(a + 1):
                 _block(u, a, b, blocks)
         for n in range(min(L, count - begin)):
-            add_blocks(blocks, n, begin + n, 4, slots, base, stride, data)
+            add_blocks(blocks, n, begin + n, corners, slots, base, stride, data)
 
 
 @njit(cache=True)

@@ -130,7 +130,9 @@ def contact_gradient(data, u, gradient, s):
 def contact_stiffness(data, values):
     """Add the stiffness [N/m] of the samples that touch at x_0; returns 0."""
     deepest, _, constants, planes, places = data
-    for b in np.flatnonzero(deepest > 0.0):
+    for b in range(len(deepest)):
+        if not deepest[b] > 0.0:
+            continue
         for g in range(L):
             depth = planes[b, 3 * L + g]
             if depth <= 0.0:

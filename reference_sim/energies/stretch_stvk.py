@@ -211,7 +211,7 @@ def _linear_stress(x, step, faces, Dm_inverse, lam, mu, stress):
 @njit(cache=True, error_model="numpy")
 def _hessian(x, faces, Dm_inverse, areas, lam, mu, stress, slots, base, stride, data):
     """Add A [(b_a.S b_c) I + lambda (F b_a)(F b_c)^T + mu ((F b_c)(F b_a)^T + (b_a.b_c) F F^T)]."""
-    L, count = LANES_FLOAT64, len(faces)
+    L, count, corners = LANES_FLOAT64, len(faces), faces.shape[1]
     u, blocks = np.empty(48 * L), np.empty(54 * L)
     for begin in range(0, count, L):
         for n in range(L):
@@ -245,7 +245,7 @@ def _hessian(x, faces, Dm_inverse, areas, lam, mu, stress, slots, base, stride, 
             for c in range(a + 1):
                 _block(u, a, c, lam, mu, blocks)
         for n in range(min(L, count - begin)):
-            add_blocks(blocks, n, begin + n, 3, slots, base, stride, data)
+            add_blocks(blocks, n, begin + n, corners, slots, base, stride, data)
 
 
 @njit(cache=True)

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from reference_sim.cholesky import RIGHT_SIDES, ScalarPattern, factorise, solve
+from reference_sim.cholesky import Cholesky, factorise, solve
 from reference_sim.cloth import Cloth
 from reference_sim.energies import bend_hinge_kernels, contact_penalty, stretch_stvk_kernels
 from reference_sim.kernels.fast_kernels import StepTerms, step_terms
@@ -26,7 +26,7 @@ from reference_sim.minimise.descent import (
     Result,
     mean_weight,
 )
-from reference_sim.potential import Potential
+from reference_sim.potential import HessianPattern, Potential
 
 HALVINGS = 12  # of a step before its direction is given up
 # Places of energies: the terms of elements come last, in their order.
@@ -34,11 +34,9 @@ INERTIA, WEIGHT, ELEMENTS = range(3)
 
 # What is constant of the vertices: inertia [N/m] and weights [N] (V,); pinned: 3 times the vertex.
 Vertices = namedtuple("Vertices", "inertia weights pinned")
-# The preconditioner: constant values (nnz,), the pattern and the factor.
-Factor = namedtuple(
-    "Factor",
-    "constant order row_starts row_columns factor_rows factor_columns starts rows values L D y filled b",
-)
+# The preconditioner of free vertices (n,): constant values (nnz,), those of a step, layout and room of the
+# factor, and room b (n + 1,) for a right side.
+Factor = namedtuple("Factor", "constant values free layout room b")
 Memory = namedtuple("Memory", "S Y rho")  # of steps (m, 3V) [m] and changes of the gradient (m, 3V) [N]
 
 
@@ -84,10 +82,7 @@ def precondition(stiffening, factor):
     values = factor.values
     copy(factor.constant, values)
     call_each(stiffening, np.empty(len(stiffening)), values)
-    return factorise(
-        values, factor.row_starts, factor.row_columns, factor.factor_rows, factor.factor_columns,
-        factor.starts, factor.rows, factor.L, factor.D, factor.y, factor.filled,
-    )  # fmt: skip
+    return factorise(values, factor.layout, factor.room, 0.0)
 
 
 @njit(cache=True, fastmath=FAST)
@@ -116,14 +111,13 @@ def add_scaled(a, scale, b):
 @njit(cache=True)
 def apply_inverse(q, factor):
     """Replace q (3V,) by the preconditioner's inverse times q."""
-    b, order = factor.b, factor.order
-    for k in range(len(order)):
-        i = 3 * order[k]
-        b[k, 0], b[k, 1], b[k, 2] = q[i], q[i + 1], q[i + 2]
-    solve(factor.starts, factor.rows, factor.L, factor.D, b)
-    for k in range(len(order)):
-        i = 3 * order[k]
-        q[i], q[i + 1], q[i + 2] = b[k, 0], b[k, 1], b[k, 2]
+    b, free = factor.b, factor.free
+    for axis in range(3):
+        for k in range(len(free)):
+            b[k] = q[3 * free[k] + axis]
+        solve(factor.layout, factor.room, b)
+        for k in range(len(free)):
+            q[3 * free[k] + axis] = b[k]
 
 
 @njit(cache=True, error_model="numpy")
@@ -307,28 +301,18 @@ def _factor(cloth: Cloth, terms: StepTerms, lanes: list[Float32Lanes]) -> tuple[
     Returns pattern and constant values, at rest, with room for the factor; and of each term whose
     stiffness changes from step to step its number, its kernel and the places of its lanes.
     """
-    free, rest = cloth.free, cloth.rest_positions
-    number = np.full(len(free), -1)
-    number[free] = np.arange(free.sum())
     fixed = [e for e in (terms.inertia, *terms.elements) if 1 in e.constant]
     changing = [(k, term) for k, term in enumerate(lanes) if term.stiffness is not None]
-    stencils = [number[e.stencils] for e in fixed] + [number[term.stencils] for _, term in changing]
-    pattern = ScalarPattern(int(free.sum()), stencils)
-    # Left of the diagonal, then the diagonal.
-    constant = np.zeros(len(pattern.row_columns) + pattern.count)
-    for energy in fixed:
-        elements, values = energy.scalar_stiffness(rest)
-        places = pattern.places(number[energy.stencils[elements]])
-        np.add.at(constant, places[places >= 0], values[places >= 0])
-    n, entries = pattern.count, len(pattern.rows)
+    widening: list[Any] = [SimpleNamespace(stencils=term.stencils, constant=()) for _, term in changing]
+    pattern = HessianPattern([*fixed, *widening], cloth.free, block=1)
+    cholesky = Cholesky(pattern.indptr, pattern.indices, pattern.order)
     factor = Factor(
-        constant, np.flatnonzero(free)[pattern.order], pattern.row_starts, pattern.row_columns,
-        pattern.factor_rows, pattern.factor_columns, pattern.starts, pattern.rows, np.empty_like(constant),
-        np.empty(entries), np.empty(n), np.zeros(n), np.empty(n, np.int64), np.zeros((n, RIGHT_SIDES)),
+        pattern.constant, np.empty_like(pattern.constant), pattern.free, cholesky.layout,
+        cholesky.room(np.float64), np.zeros(len(pattern.free) + 1),
     )  # fmt: skip
-    stiffening = []
-    for k, term in changing:
-        places = pattern.places(number[term.stencils])
-        blocks = to_blocks(places.reshape(len(places), places.shape[1] ** 2))
-        stiffening.append((k, kernel_argument(term.stiffness), blocks))
+    places = pattern.slots[len(fixed) :]
+    stiffening = [
+        (k, kernel_argument(term.stiffness), to_blocks(slots))
+        for (k, term), slots in zip(changing, places)
+    ]
     return factor, stiffening

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from reference_sim.cholesky import Cholesky
 from reference_sim.minimise.descent import Stop, dot, mean_weight
 from reference_sim.potential import Potential
-from reference_sim.supernodal import Cholesky
 
 if TYPE_CHECKING:
     from reference_sim.minimise.newton import NewtonRun
@@ -36,7 +36,7 @@ class FactorisedHessian:
 
     def _analyse(self) -> None:
         pattern = self._pattern
-        self._solver = Cholesky(pattern.indptr, pattern.indices, pattern.order, pattern.block)
+        self._solver = Cholesky(pattern.indptr, pattern.indices, pattern.order)
 
     def start_again(self) -> None:
         """Go back to the pattern without what dynamic terms have added."""
@@ -99,10 +99,13 @@ def convergence_check(run: NewtonRun, values: np.ndarray, round_off: float) -> S
             f"round-off: up to {round_off:.1e} in the residual, {residual:.1e}, tolerance {tolerance:.1e}"
         )
     if run.factorise(values, run.hessian.tiny_shift(values)):
-        step = float(np.abs(run.hessian.solve(-run.g)).max(initial=0.0))
+        p = run.hessian.solve(-run.g)
+        step = float(np.abs(p).max(initial=0.0))
         small = step <= step_tolerance or residual == 0.0
         if not small and run.factorise(values, 0.0):
             return None
+        if small and not relaxed:
+            run.polish(p)  # round-off is left, and not the tolerance
         # Without curvature no step can be told from another.
         evidence = f"Newton step {step:.1e} m" if small else "a direction without curvature"
         return Stop("converged", f"{reason}, {evidence}", relaxed)

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from reference_sim.cholesky import Cholesky
 from reference_sim.energies.energy import demand_positive
 from reference_sim.kernels.fast_kernels import terms_without_kernel, warn_slow_path
 from reference_sim.minimise.descent import (
@@ -29,14 +30,12 @@ from reference_sim.minimise.descent import (
 )
 from reference_sim.minimise.newton import Newton
 from reference_sim.potential import Potential
-from reference_sim.supernodal import Cholesky
 
 if TYPE_CHECKING:
     from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS
 
 SWITCH, COMPILED_SWITCH = 1.0, 0.1  # relative residuals at which Newton takes over
 PATIENCE = 100  # iterations after which it does in any case
-LARGEST_COMPILED = 10_000  # vertices: from about here on a package's factorisation is faster
 
 
 class LBFGS:
@@ -64,8 +63,7 @@ class LBFGS:
         self.tolerance, self.timeout = tolerance, timeout
         demand_positive("LBFGS", tolerance=tolerance)
         self.max_iterations = min(PATIENCE, max_iterations) if finish else max_iterations
-        small = potential.cloth.vertex_count <= LARGEST_COMPILED
-        fast = finish and memory > 0 and small and potential.time_step is not None
+        fast = finish and memory > 0 and potential.time_step is not None
         if fast and (slow := terms_without_kernel(potential, "float32_lanes")):
             instead = "every step begins in float64 by numpy (docs/extend.md, An energy)"
             warn_slow_path("LBFGS", "float32 kernel", slow, instead)

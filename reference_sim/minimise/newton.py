@@ -182,6 +182,14 @@ class NewtonRun(Descent):
             self.kind = np.float64
         return self.factorised
 
+    def polish(self, p: np.ndarray) -> None:
+        """Take a last step p (3n,) if it makes the gradient smaller."""
+        step = self.spread(p)
+        if self.potential.largest_step(self.x, step) == 1.0:
+            value, g = self.evaluate(self.x + step)
+            if np.abs(g).max(initial=0.0) < np.abs(self.g).max(initial=0.0):
+                self.x, self.value, self.g = self.x + step, value, g
+
     def first_projection(self) -> int:
         """Return the level to begin with: wrinkled cloth stays near that of the last step."""
         return self.projection_level if self.raised else max(self.projection_level - 1, 0)

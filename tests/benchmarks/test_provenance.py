@@ -88,7 +88,7 @@ TASKS = {
     "metrics": schedule.MEASURING,
     "case": schedule.CASES,
 }
-NOT_COMPUTING = {"distributed", "filelock", "lazy_loader", "tqdm", "reports"}
+NOT_COMPUTING = {"filelock", "lazy_loader", "tqdm", "reports"}
 DISTRIBUTION = {"skfem": "scikit-fem", "igl": "libigl"}
 
 

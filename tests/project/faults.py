@@ -143,7 +143,7 @@ FAULTS = (
           "history.add(alpha * p, self.g - g)", "history.add(alpha * p, self.g)"),
     Fault("block transposed in the sparse matrix", "_block_keys", "key = column * n + row",
           "key = row * n + column"),
-    Fault("lower half only", "symmetrise", "lower + sp.tril(lower, -1).T", "lower"),
+    Fault("lower half only", "HessianPattern.symmetrise", "lower + sp.tril(lower, -1).T", "lower"),
     # the metric that judges
     Fault("curvature over 2 A", "mean_curvature", "np.divide(norm, 4.0 * area", "np.divide(norm, 2.0 * area"),
     Fault("barycentric cells at half weight", "mean_curvature", "weighted) / 8.0", "weighted) / 6.0"),

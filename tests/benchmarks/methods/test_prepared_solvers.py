@@ -13,8 +13,8 @@ from benchmarks.method import Method
 from benchmarks.methods import sweeps
 from benchmarks.methods.simulation import Simulation
 from benchmarks.methods.warm_started import WarmStarted
-from reference_sim import cholesky, potential
-from reference_sim.minimise import factorised, lbfgs
+from reference_sim import potential
+from reference_sim.minimise import compiled_lbfgs, factorised, lbfgs
 from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS
 from tests.benchmarks.runner.tasks_by_hand import prepared, simulated, small_scene
 
@@ -23,7 +23,7 @@ SOLVERS = (
     "xpbd-40",
 )  # fmt: skip
 SET_UP = (  # what analyses a pattern
-    (potential, "nested_dissection"), (cholesky, "nested_dissection"), (factorised, "Cholesky"),
+    (potential, "nested_dissection"), (compiled_lbfgs, "Cholesky"), (factorised, "Cholesky"),
     (lbfgs, "Cholesky"), (sweeps, "incidence"),
 )  # fmt: skip
 

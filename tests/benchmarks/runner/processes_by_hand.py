@@ -1,8 +1,7 @@
-"""Tasks that write files or go wrong, and processes that do them: here, or of a cluster on this machine."""
+"""Tasks that write files or go wrong, and processes that do them."""
 
 from __future__ import annotations
 
-import json
 import multiprocessing
 import os
 import signal
@@ -17,7 +16,6 @@ import numpy as np
 from benchmarks.method import WorkerDied
 from benchmarks.results.run_folder import RunFolder
 from benchmarks.runner.cache import Cache
-from benchmarks.runner.cluster import Cluster
 from benchmarks.runner.executor import Executor
 from benchmarks.runner.loop import Runner
 from benchmarks.runner.task import Context, Outcome, Task
@@ -31,9 +29,7 @@ def fail(how: str) -> None:
         raise ValueError("broken on\npurpose")
     if how == "die":
         os.kill(os.getpid(), signal.SIGKILL)
-    if how == "die with the worker":
-        os.kill(worker(), signal.SIGKILL)
-    if how in ("hang", "die with the worker"):
+    if how == "hang":
         signal.pause()
     if how == "torch":
         raise RuntimeError("DefaultCPUAllocator: can't allocate memory")
@@ -99,77 +95,27 @@ def chain(sleep: float = 0.0) -> list[Task]:
 # --- what does them ---
 
 
-def executor(folder: Path, address: str = "", workers: int = 1) -> Executor:
-    """Return the executor of a cluster, or without an address of processes here."""
+def executor(folder: Path, workers: int = 1) -> Executor:
     folder.mkdir(exist_ok=True)
-    run = RunFolder(folder)
-    return Executor(run, None, workers, Cluster(run, None, address) if address else None)
+    return Executor(RunFolder(folder), None, workers)
 
 
-def finish(folder: Path, *tasks: Task, address: str = "", workers: int = 1, **options) -> Runner:
+def finish(folder: Path, *tasks: Task, workers: int = 1, **options) -> Runner:
     """The tasks, run or reused."""
     RunFolder(folder).remove_parts()
     runner = Runner(tasks, Cache(RunFolder(folder), **options))
-    runner.run(executor(folder, address, workers))
+    runner.run(executor(folder, workers))
     return runner
 
 
-def together(folder: Path, *batches: list[Task], address: str = "") -> dict[str, Outcome]:
-    left, doing = [(batch, {}) for batch in reversed(batches)], executor(folder, address)
+def together(folder: Path, *batches: list[Task]) -> dict[str, Outcome]:
+    left, doing = [(batch, {}) for batch in reversed(batches)], executor(folder)
     try:
         return {
             task.name: outcome for task, outcome in doing.together(lambda: left.pop() if left else None)
         }
     finally:
         doing.close()
-
-
-class Dask:
-    """A scheduler and so many workers of one thread; each process leads a session of its own."""
-
-    def __init__(self, folder: Path, workers: int) -> None:
-        self.folder, self.count = folder, workers
-        self.workers: list[subprocess.Popen] = []
-
-    def __enter__(self) -> Dask:
-        self.start_scheduler()
-        for _ in range(self.count):
-            self.add()
-        return self
-
-    def start_scheduler(self, port: str = "0") -> None:
-        file = self.folder / "scheduler.json"
-        file.unlink(missing_ok=True)
-        self.scheduler = self._start(
-            "scheduler", "--port", port, "--scheduler-file", str(file),
-            DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="2",
-        )  # fmt: skip
-        until(lambda: file.is_file() and file.read_text().endswith("}"))
-        self.address = json.loads(file.read_text())["address"]
-
-    def restart_scheduler(self) -> None:
-        """Kill it and then its workers, and start another at its address."""
-        self.__exit__()
-        self.workers.clear()
-        self.start_scheduler(self.address.rpartition(":")[2])
-
-    def add(self, nanny: str = "--no-nanny") -> None:
-        """Start a worker of one thread; a nanny starts another in its place."""
-        options = (self.address, "--nthreads", "1", "--local-directory", str(self.folder), nanny)
-        self.workers.append(self._start("worker", *options))
-
-    def _start(self, what: str, *arguments: str, **environment: str) -> subprocess.Popen:
-        with (self.folder / f"{what}.log").open("ab") as log:
-            return subprocess.Popen(
-                [sys.executable, "-m", f"distributed.cli.dask_{what}", *arguments, "--no-dashboard"],
-                env=os.environ | {"PYTHONPATH": str(Path(__file__).resolve().parents[3])} | environment,
-                cwd=self.folder, stdout=subprocess.DEVNULL, stderr=log, start_new_session=True,
-            )  # fmt: skip
-
-    def __exit__(self, *_) -> None:
-        for process in (self.scheduler, *self.workers):
-            process.kill()
-            process.wait()
 
 
 def until(true, seconds: float = 60.0) -> None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -134,9 +133,9 @@ def grouped(scene: BuiltScene, positions: dict[str, np.ndarray], **fields) -> Sc
 
 
 class InProcess:
-    """An executor that does everything here: the seam behind which a cluster could stand."""
+    """An executor that does everything in this process."""
 
-    back_end = SimpleNamespace(slots=1)
+    workers = 1
 
     def __init__(self, folder: RunFolder, assets: Assets | None = None) -> None:
         self.folder, self.assets = folder, assets

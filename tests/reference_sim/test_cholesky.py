@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from reference_sim.cholesky import nested_dissection
-from reference_sim.supernodal import Cholesky
+from reference_sim.cholesky import Cholesky
+from reference_sim.elimination import nested_dissection
 
 
 def random_matrix(vertices, block, neighbours, seed):
@@ -33,7 +33,7 @@ def solver(matrix, block, seed=0):
     vertices = matrix.shape[0] // block
     order = np.random.default_rng(seed).permutation(vertices)
     order = (block * order[:, None] + np.arange(block)).ravel()
-    return Cholesky(matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64), order, block)
+    return Cholesky(matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64), order)
 
 
 @pytest.mark.parametrize("block", [1, 3])
@@ -63,7 +63,7 @@ def test_wide_supernodes_and_merged_ones_leave_the_answer_alone():
     whole = (matrix + sp.tril(matrix, -1).T).tocsc()
     order = nested_dissection((sp.tril(whole, -1) + sp.triu(whole, 1)).tocsr())
     cholesky = Cholesky(matrix.indptr.astype(np.int64), matrix.indices.astype(np.int64), order)
-    widths = cholesky._nodes.fronts["width"]
+    widths = cholesky.layout.fronts["width"]
     assert widths.max() > 24 and len(widths) < side**2 / 4
     assert cholesky.factorise(matrix.data)
     b = np.random.default_rng(0).normal(size=side**2)
