@@ -98,7 +98,9 @@ class Cholesky:
         places[stored] = panels[s] + (low - first[s]) * strides[s] + local(s, high)
         filler = np.flatnonzero(numbers < 0)
         fillers = panels[front[filler]] + within[filler] * (strides[front[filler]] + 1)
-        self.layout = Layout(places, fronts, runs, fillers, np.append(order, count)[numbers])
+        # A signed index is first asked whether it counts from the end.
+        unknowns = np.append(order, count)[numbers].astype(np.uint32)
+        self.layout = Layout(places, fronts, runs, fillers, unknowns)
         sizes = panels[-1], room, (widths + ranks).max(initial=0)
         self._sizes = tuple(size + 2 * LANES for size in sizes)  # a vector may reach beyond the end
         self._rooms: dict[type, Room] = {}
@@ -122,16 +124,15 @@ class Cholesky:
 
     def solve(self, b: np.ndarray) -> np.ndarray:
         """Solve with the last factorisation: b (n,) or (n, k), same shape back."""
-        x = np.zeros((*b.shape[1:], len(b) + 1), self._kind)
-        x[..., :-1] = b.T
-        for row in x.reshape(-1, len(b) + 1):
-            solve(self.layout, self.room(self._kind), row)
-        return x[..., :-1].T.astype(np.float64)
+        x = np.zeros((b[0].size, len(b) + 1), self._kind)
+        x[:, :-1] = b.reshape(len(b), -1).T
+        solve(self.layout, self.room(self._kind), x)
+        return x[:, :-1].T.reshape(b.shape).astype(np.float64)
 
 
 def _pad(numbers: np.ndarray) -> np.ndarray:
     """Return strides of rows of so many numbers, of which a vector may begin at any."""
-    return -(-numbers // LANES) * LANES + LANES
+    return -(-(numbers + LANES) // 8) * 8
 
 
 def _two_stacks(parents: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, int]:
@@ -253,24 +254,26 @@ def _eliminate(L, start, stride, length, least, j):
 
 @njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
 def solve(layout, room, b):
-    """Replace b (n + 1,), whose last number is 0, by the solution."""
-    fronts, L, work, count = layout.fronts, room.L, room.work, len(layout.fronts)
+    """Replace b (k, n + 1), whose last numbers are 0, by the solutions."""
+    fronts, L, count = layout.fronts, room.L, len(layout.fronts)
     for step in range(2 * count):
         front = fronts[min(step, 2 * count - 1 - step)]
         width, stride, changed = front.width, front.stride, front.width + front.rank
         numbers = layout.unknowns[front.start : front.start + changed]
-        x = work[: len(numbers)]
-        for i in range(len(numbers)):
-            x[i] = b[numbers[i]]
-        if step < count:
-            for j in range(0, width, TILE_ROWS):
-                _solve_down(L, front.panel + j * (stride + 1), stride, x[j:])
-        else:
+        x = room.work[: len(numbers)]
+        if step >= count:
             changed = width
-            for j in range(width - TILE_ROWS, -1, -TILE_ROWS):
-                _solve_up(L, front.panel + j * (stride + 1), stride, x[j:])
-        for i in range(changed):
-            b[numbers[i]] = x[i]
+        for side in range(len(b)):
+            for i in range(len(numbers)):
+                x[i] = b[side, numbers[i]]
+            if step < count:
+                for j in range(0, width, TILE_ROWS):
+                    _solve_down(L, front.panel + j * (stride + 1), stride, x[j:])
+            else:
+                for j in range(width - TILE_ROWS, -1, -TILE_ROWS):
+                    _solve_up(L, front.panel + j * (stride + 1), stride, x[j:])
+            for i in range(changed):
+                b[side, numbers[i]] = x[i]
 
 
 @njit(cache=True, inline="always", fastmath={"contract", "reassoc", "nsz"})

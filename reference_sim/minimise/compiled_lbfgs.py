@@ -35,7 +35,7 @@ INERTIA, WEIGHT, ELEMENTS = range(3)
 # What is constant of the vertices: inertia [N/m] and weights [N] (V,); pinned: 3 times the vertex.
 Vertices = namedtuple("Vertices", "inertia weights pinned")
 # The preconditioner of free vertices (n,): constant values (nnz,), those of a step, layout and room of the
-# factor, and room b (n + 1,) for a right side.
+# factor, and room b (3, n + 1) for right sides.
 Factor = namedtuple("Factor", "constant values free layout room b")
 Memory = namedtuple("Memory", "S Y rho")  # of steps (m, 3V) [m] and changes of the gradient (m, 3V) [N]
 
@@ -82,7 +82,7 @@ def precondition(stiffening, factor):
     values = factor.values
     copy(factor.constant, values)
     call_each(stiffening, np.empty(len(stiffening)), values)
-    return factorise(values, factor.layout, factor.room, 0.0)
+    return factorise(values, factor.layout, factor.room, np.float32(0.0))
 
 
 @njit(cache=True, fastmath=FAST)
@@ -112,12 +112,13 @@ def add_scaled(a, scale, b):
 def apply_inverse(q, factor):
     """Replace q (3V,) by the preconditioner's inverse times q."""
     b, free = factor.b, factor.free
-    for axis in range(3):
-        for k in range(len(free)):
-            b[k] = q[3 * free[k] + axis]
-        solve(factor.layout, factor.room, b)
-        for k in range(len(free)):
-            q[3 * free[k] + axis] = b[k]
+    for k in range(len(free)):
+        for axis in range(3):
+            b[axis, k] = q[3 * free[k] + axis]
+    solve(factor.layout, factor.room, b)
+    for k in range(len(free)):
+        for axis in range(3):
+            q[3 * free[k] + axis] = b[axis, k]
 
 
 @njit(cache=True, error_model="numpy")
@@ -308,7 +309,7 @@ def _factor(cloth: Cloth, terms: StepTerms, lanes: list[Float32Lanes]) -> tuple[
     cholesky = Cholesky(pattern.indptr, pattern.indices, pattern.order)
     factor = Factor(
         pattern.constant, np.empty_like(pattern.constant), pattern.free, cholesky.layout,
-        cholesky.room(np.float64), np.zeros(len(pattern.free) + 1),
+        cholesky.room(np.float32), np.zeros((3, len(pattern.free) + 1), np.float32),
     )  # fmt: skip
     places = pattern.slots[len(fixed) :]
     stiffening = [

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import os
 import signal
 import subprocess
@@ -40,13 +39,6 @@ def fail(how: str) -> None:
         raise KeyboardInterrupt
 
 
-def worker() -> int:
-    """Return the id of the process that asked for this one, not of the server that forked it."""
-    asking = multiprocessing.parent_process()
-    assert asking is not None and asking.pid is not None
-    return asking.pid
-
-
 def write(name: str, how: str, sleep: float, context: Context, needed) -> Outcome:
     """Write a file of what is needed and of the task's name, unless `how` says what to do instead.
 
@@ -54,7 +46,7 @@ def write(name: str, how: str, sleep: float, context: Context, needed) -> Outcom
     """
     if sleep:
         with (context.folder.path.parent / "begun").open("a") as file:
-            file.write(f"{worker()} {os.getpid()}\n")
+            file.write(f"{os.getpid()}\n")
     fail(how)
     time.sleep(sleep)
     context.memo.setdefault("done", []).append(name)

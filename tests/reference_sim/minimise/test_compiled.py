@@ -37,7 +37,8 @@ def test_iterations_are_those_of_the_exact_solver(iterations):
     descent = CompiledLBFGS(potential, max_iterations=iterations).minimise(guess)
     assert descent.iterations == iterations == exact.iterations and descent.status == "max_iterations"
     start = potential.value(guess)
-    assert start - potential.value(descent.positions) == pytest.approx(start - exact.energy, rel=2e-3)
+    # Its preconditioner is factorised in float32: directions have four digits.
+    assert start - potential.value(descent.positions) == pytest.approx(start - exact.energy, rel=4e-3)
     assert (
         np.abs(descent.positions - exact.positions).max() < 0.02 * np.abs(exact.positions - guess).max()
     )
