@@ -14,7 +14,14 @@ import numpy as np
 
 from reference_sim.elimination import supernodes
 from reference_sim.kernels.kernel_cache import njit
-from reference_sim.kernels.lanes import LANES, LANES_FLOAT64, TILE_ROWS, add_run, subtract_product
+from reference_sim.kernels.lanes import (
+    LANES,
+    LANES_FLOAT64,
+    TILE_ROWS,
+    add_run,
+    dot_rows,
+    subtract_product,
+)
 
 BLOCK = 24  # rows of a panel that are subtracted from at once
 # A pivot below this share of the diagonal has lost too many digits in float32.
@@ -22,13 +29,11 @@ LEAST_FLOAT32 = 1e-4
 
 # Of each supernode: columns, rows below, stride and start of its panel and of what it subtracts, parent,
 # first and last of its runs, and start of its unknowns.
-FIELDS = (
-    "width", "rank", "stride", "panel", "update_stride", "update", "parent", "run", "run_end", "start",
-)  # fmt: skip
-FRONT = np.dtype([(name, np.int64) for name in FIELDS])
-# Places of a matrix's values, -1 where they are ignored; fronts (m,) of FRONT; runs (first, end, place) of
-# rows below, which are one in the parent's front, too; places of the diagonal of columns that fill a panel
-# up to TILE_ROWS; numbers of all fronts' unknowns, n for those columns.
+FIELDS = "width rank stride panel update_stride update parent run run_end start"
+FRONT = np.dtype([(name, np.int64) for name in FIELDS.split()])
+# Places of a matrix's values, -1 where they are ignored; fronts (m,); runs (first, end, place) of rows
+# below, which are one in the parent's front, too; places of the diagonal of columns that fill a panel up to
+# TILE_ROWS; numbers of all fronts' unknowns, n for those columns.
 Layout = namedtuple("Layout", "places fronts runs fillers unknowns")
 Room = namedtuple("Room", "L updates work")
 
@@ -85,13 +90,11 @@ class Cholesky:
         start = head - below[node[head]]
         runs = np.stack([start, start + np.diff(np.append(head, len(rows))), target[head]], axis=1)
         run_ends = np.searchsorted(node[head], np.arange(len(spans)), side="right")
-        fronts = np.zeros(len(spans), FRONT)
-        fields = (
+        fields = [
             widths, ranks, strides, panels[:-1], update_strides, updates, above,
             np.append(0, run_ends)[:-1], run_ends, begin[:-1],
-        )  # fmt: skip
-        for name, field in zip(FIELDS, fields):
-            fronts[name] = field
+        ]  # fmt: skip
+        fronts = np.rec.fromarrays(fields, dtype=FRONT)
         low, high = np.sort(np.argsort(order)[entries[stored]], axis=1).T
         places = np.full(len(indices), -1)
         s = np.repeat(np.arange(len(spans)), spans)[low]
@@ -156,12 +159,6 @@ def _two_stacks(parents: np.ndarray, sizes: np.ndarray) -> tuple[np.ndarray, int
 
 
 @njit(cache=True)
-def _clear(x):
-    for i in range(len(x)):
-        x[i] = 0.0
-
-
-@njit(cache=True)
 def _subtract(C, c, c_stride, P, p, p_stride, count, rows, columns):
     """Subtract P^T P from the upper triangle of C: of P `count` rows, of C `rows`, of both `columns`."""
     lanes = LANES_FLOAT64 if C.itemsize == 8 else LANES
@@ -198,7 +195,7 @@ def factorise(values, layout, room, least):
     least: the smallest pivot, as a share of the matrix's diagonal.
     """
     fronts, L, updates, work = layout.fronts, room.L, room.updates, room.work
-    _clear(L)
+    L.fill(0.0)
     for i in range(len(values)):
         if layout.places[i] >= 0:
             L[layout.places[i]] += values[i]
@@ -208,7 +205,7 @@ def factorise(values, layout, room, least):
     for s in range(len(fronts)):
         front = fronts[s]
         width, rank, stride, update = front.width, front.rank, front.stride, front.update
-        _clear(updates[update : update + rank * front.update_stride])
+        updates[update : update + rank * front.update_stride].fill(0.0)
         for j in range(width):
             work[j] = least * L[front.panel + j * (stride + 1)]
         while count and fronts[waiting[count - 1]].parent == s:
@@ -252,7 +249,7 @@ def _eliminate(L, start, stride, length, least, j):
     return True
 
 
-@njit(cache=True, fastmath={"contract", "reassoc", "nsz"})
+@njit(cache=True)
 def solve(layout, room, b):
     """Replace b (k, n + 1), whose last numbers are 0, by the solutions."""
     fronts, L, count = layout.fronts, room.L, len(layout.fronts)
@@ -276,7 +273,7 @@ def solve(layout, room, b):
                 b[side, numbers[i]] = x[i]
 
 
-@njit(cache=True, inline="always", fastmath={"contract", "reassoc", "nsz"})
+@njit(cache=True, inline="always")
 def _solve_down(L, start, stride, b):
     """Solve for the first TILE_ROWS numbers of b with rows of L^T from `start` on; subtract from the rest."""
     second, third = start + stride, start + 2 * stride
@@ -290,17 +287,11 @@ def _solve_down(L, start, stride, b):
         rest[i] -= u[i] * x + v[i] * y + w[i] * z
 
 
-@njit(cache=True, inline="always", fastmath={"contract", "reassoc", "nsz"})
+@njit(cache=True, inline="always")
 def _solve_up(L, start, stride, b):
     """Solve for the first TILE_ROWS numbers of b where the rest is solved for."""
     second, third = start + stride, start + 2 * stride
-    rest, end = b[3:], len(b)
-    u, v, w = L[start + 3 : start + end], L[second + 3 : second + end], L[third + 3 : third + end]
-    x = y = z = L.dtype.type(0.0)
-    for i in range(len(rest)):
-        x += u[i] * rest[i]
-        y += v[i] * rest[i]
-        z += w[i] * rest[i]
+    x, y, z = dot_rows(L, start + 3, stride, b, 3, len(b) - 3)
     z = (b[2] - z) * L[third + 2]
     y = (b[1] - y - L[second + 2] * z) * L[second + 1]
     x = (b[0] - x - L[start + 1] * y - L[start + 2] * z) * L[start]

@@ -49,7 +49,7 @@ def make_parser() -> argparse.ArgumentParser:
         epilog=EXAMPLES,
     )
     add = parser.add_argument
-    add("garment", help="triangle mesh at rest: OBJ, PLY, STL or OFF")
+    add("garment", help="triangle mesh at rest: OBJ or PLY")
     add("-o", "--out", type=Path, required=True, metavar="OUT.vtkhdf", help="trajectory")
     add("--units", choices=("m", "cm", "mm", "in"), default="m", help="of all meshes (default m)")
     add("--up", choices=("y", "z"), default="y", help="up axis of all meshes (default y)")

@@ -32,7 +32,7 @@ def make_parser() -> argparse.ArgumentParser:
         "place on the body, rest shape, openings, or what mends them.",
         epilog=f"{EXAMPLES}\n\n{GARMENT_WORDS}",
     )
-    parser.add_argument("files", nargs="+", metavar="FILE", help="OBJ, PLY, STL or OFF")
+    parser.add_argument("files", nargs="+", metavar="FILE", help="OBJ or PLY")
     parser.add_argument(
         "--body", metavar="FILE", help="a body of your own (default: that of the package)"
     )

@@ -13,7 +13,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
-MESH_SUFFIXES = (".obj", ".ply", ".stl", ".off")
+MESH_SUFFIXES = (".obj", ".ply")
 UNITS, AXES, REST_SHAPES = ("m", "cm", "mm", "in"), ("y", "z"), ("mesh", "uv")
 GARMENT_WORDS = """behind the path of a garment, as in shirt.obj,units=cm,up=z: units (m, cm, mm, in),
 up (y, z), shift='0 0.1 0' [m] where the body stood elsewhere, rest=uv where the UV chart is the pattern,
@@ -30,7 +30,7 @@ class GarmentFile:
     """A mesh file with all that it does not state itself.
 
     Attributes:
-        path: OBJ, PLY, STL or OFF.
+        path: OBJ or PLY.
         units: of the file, "m", "cm", "mm" or "in".
         up: vertical axis of the file, "y" or "z".
         shift: (3,) [m], added after conversion.

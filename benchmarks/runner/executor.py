@@ -31,17 +31,6 @@ class Executor:
         self._all: list[TaskProcess] = []
         self._idle: list[TaskProcess] = []
 
-    def _do(self, tasks: Sequence[Task], outcomes: Needed) -> Iterator[Outcome]:
-        """Yield the outcomes of a batch, done by one process; called by several threads."""
-        try:
-            process = self._idle.pop()
-        except IndexError:  # none is idle, or another thread was first
-            process = TaskProcess(self.folder, self.assets)
-            self._all.append(process)
-        for task in tasks:
-            yield process.do(task, outcomes)
-        self._idle.append(process)
-
     def together(self, ready: Callable[[], Batch | None]) -> Iterator[Done]:
         """Do batches of untimed tasks, some side by side, until none is at work or ready.
 
@@ -51,10 +40,17 @@ class Executor:
         stopped = threading.Event()
 
         def do(tasks: Sequence[Task], outcomes: Needed) -> None:
-            for outcome, task in zip(self._do(tasks, outcomes), tasks):
+            try:
+                process = self._idle.pop()
+            except IndexError:  # none is idle, or another thread was first
+                process = TaskProcess(self.folder, self.assets)
+                self._all.append(process)
+            for task in tasks:
+                outcome = process.do(task, outcomes)
                 if stopped.is_set():  # the process was killed at it
                     return
                 finished.put((task, outcome))
+            self._idle.append(process)
 
         at_work: set[Future[None]] = set()
         with ThreadPoolExecutor(self.workers) as threads:

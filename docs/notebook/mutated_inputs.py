@@ -194,17 +194,6 @@ TEXT: dict[str, tuple[list[Mutation], list[Mutation]]] = {
          on_line("element (vertex|face)", number_to("1", "-3", "99999999999")), dropped("end_header"),
          replaced("ascii", "binary_middle_endian"), replaced("property double x", "property double w")],
     ),
-    "garment.off": (
-        [*PLAIN, insert("# by hand", 1), insert("", 1)],
-        [nothing, cut(0.0, 0.97), on_line(r"-?\d+\.\d", number_to(*BAD)), on_line(r"3 \d", number_to("99999", "-5", "x")),
-         dropped(r"3 \d"), dropped(r"-?\d+\.\d"), replaced("^OFF", "OFFS"), replaced(r"^(\d+) (\d+) 0$", r"1 \2 0"), replaced(r"^(\d+) (\d+) 0$", r"\1 99999999999 0"),
-         replaced(r"^(\d+) (\d+) 0$", r"-3 \2 0")],
-    ),
-    "garment.stl": (
-        [*PLAIN, insert("", 1), replaced("facet normal .*$", "facet normal 0 0 0")],
-        [nothing, on_line(" *vertex", number_to(*BAD)), dropped(" *vertex"), doubled(" *vertex"),
-         cut(0.0, 0.004), on_line(" *vertex", number_to("1e300", "1e30"))],
-    ),
     "study.toml": (
         [*PLAIN, insert("# by hand", 0), insert("", 0), replaced(" = ", "  =   ")],
         [nothing, insert("motion = 3", 0), insert("[sizes", 0), insert("seeds = [0, 'a']", 0), doubled("seeds"),
@@ -439,12 +428,6 @@ def write_shirt(path: Path) -> None:
     """Write the T-shirt as text of the kind of mesh that the path names."""
     if path.suffix == ".obj":
         write_obj(path, SHIRT.rest_positions, SHIRT.faces)
-    elif path.suffix == ".off":
-        rows = [" ".join(f"{x:.9f}" for x in p) for p in SHIRT.rest_positions]
-        rows += [f"3 {a} {b} {c}" for a, b, c in SHIRT.faces]
-        path.write_text(
-            "\n".join(["OFF", f"{len(SHIRT.rest_positions)} {len(SHIRT.faces)} 0", *rows]) + "\n"
-        )
     else:
         mesh = meshio.Mesh(SHIRT.rest_positions, [("triangle", SHIRT.faces)])
         with contextlib.redirect_stdout(io.StringIO()):
@@ -511,8 +494,8 @@ KINDS = [
     TextKind("skeleton.asf", write_pair, lambda p: motion_of(p.with_suffix(".amc"))),
     ArrayKind("amass.npz", AMASS, MOTION_ARRAYS, motion_of),
     ArrayKind("amass.pkl", AMASS, MOTION_ARRAYS, motion_of),
-    *(TextKind(f"garment.{suffix}", write_shirt, garment_of) for suffix in ("obj", "ply", "off", "stl")),
-    *(BinaryKind(f"binary.{suffix}", write_shirt, garment_of) for suffix in ("ply", "stl")),
+    *(TextKind(f"garment.{suffix}", write_shirt, garment_of) for suffix in ("obj", "ply")),
+    BinaryKind("binary.ply", write_shirt, garment_of),
     SequenceKind("obstacle", write_frames, obstacle_of),
     SequenceKind("roll_out", write_frames, roll_out_of),
     ArrayKind("roll_out.npz", ROLL_OUT, ROLL_OUT_ARRAYS, roll_out_of),

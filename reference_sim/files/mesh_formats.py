@@ -1,7 +1,7 @@
-"""Contents of OBJ, PLY, OFF and STL files: points, polygons and texture coordinates, as they stand there.
+"""Contents of OBJ and PLY files: points, polygons and texture coordinates, as they stand there.
 
-The libraries at hand do not: meshio refuses texture coordinates of corners and most variants of OFF, VTK
-keeps PLY in single precision, libigl drops texture coordinates.
+The libraries at hand do not: meshio refuses texture coordinates of corners, VTK keeps PLY in single
+precision, libigl drops texture coordinates.
 
 Nothing is allocated by a number that a file states, which may be more than its bytes.
 """
@@ -59,7 +59,8 @@ def _read_obj(path: Path) -> Contents:
                     polygons.append([_resolve_index(c[0], len(points)) for c in corners])
                     uv_polygons.append([_resolve_index(c[1], len(uv)) if c[1] else -1 for c in corners])
             except (ValueError, IndexError):
-                raise _line_error(number, line) from None
+                fault = f"line {number} is not understood: {line.strip()[:60]!r}"
+                raise ValueError(fault) from None
     return points, polygons, uv, uv_polygons
 
 
@@ -77,58 +78,6 @@ def _index(text: str | float) -> int:
     if abs(number) >= 1 << 62:
         raise ValueError(f"{text} is no index")
     return number
-
-
-def _line_error(number: int, line: str) -> ValueError:
-    return ValueError(f"line {number} is not understood: {line.strip()[:60]!r}")
-
-
-def _read_off(path: Path) -> Contents:
-    """Read OFF with its variants: C, N or ST before the word, counts beside it, comments, colours."""
-    text = path.read_text(encoding="utf-8-sig", errors="replace")
-    head = re.match(r"(?:\s*#.*\n)*\s*(?:ST)?C?N?OFF", text)
-    if head is None:
-        raise ValueError("does not begin with OFF")
-    counts: list[int] = []
-    points: list[list[float]] = []
-    polygons: list[list[int]] = []
-    lines = text[head.end() :].split("\n")
-    for number, line in enumerate(lines, start=1 + text.count("\n", 0, head.end())):
-        fields = line.partition("#")[0].split()
-        try:
-            if not fields:
-                continue
-            if not counts:
-                counts = [int(fields[0]), int(fields[1])]
-            elif len(points) < counts[0]:
-                x, y, z = fields[:3]
-                points.append([float(x), float(y), float(z)])
-            elif len(polygons) < counts[1]:
-                polygons.append([_index(fields[1 + k]) for k in range(int(fields[0]))])
-        except (ValueError, IndexError):
-            raise _line_error(number, line) from None
-    if [len(points), len(polygons)] != counts:
-        raise ValueError(
-            f"ends with {len(points)} vertices and {len(polygons)} faces, and states {counts}"
-        )
-    return points, polygons, (), ()
-
-
-def _read_stl(path: Path) -> Contents:
-    """Read STL: a triangle is three points, and points at one place are one."""
-    data = path.read_bytes()
-    count = int.from_bytes(data[80:84], "little")
-    if len(data) == 84 + 50 * count:
-        record = np.dtype([("normal", "<f4", 3), ("corners", "<f4", 9), ("attribute", "<u2")])
-        corners = np.frombuffer(data, record, count, 84)["corners"].reshape(-1, 3)
-    elif not data.lstrip().startswith(b"solid"):
-        raise ValueError(f"is no whole STL ({count} triangles stated)")
-    else:
-        points = re.findall(rb"\bvertex\s+(\S+)\s+(\S+)\s+(\S+)", data)
-        corners = np.array([list(map(float, point)) for point in points]).reshape(-1, 3)
-    _, firsts, places = np.unique(corners, axis=0, return_index=True, return_inverse=True)
-    order = np.argsort(firsts)
-    return corners[firsts[order]], list(np.argsort(order)[places].reshape(-1, 3)), (), ()
 
 
 def _read_ply(path: Path) -> Contents:
@@ -210,6 +159,4 @@ def _read_records(
     return {n: v if len(codes[n]) > 1 else np.array(v)[:, 0] for n, v in values.items()}, at
 
 
-READERS: dict[str, Callable[[Path], Contents]] = {
-    ".obj": _read_obj, ".ply": _read_ply, ".stl": _read_stl, ".off": _read_off,
-}  # fmt: skip
+READERS: dict[str, Callable[[Path], Contents]] = {".obj": _read_obj, ".ply": _read_ply}

@@ -1,9 +1,4 @@
-"""Distances from samples to faces: bounds for LANES samples and a leaf of faces at once, and the exact one.
-
-Bounds are in float32 and never above the true distance by more than a share of ROUND_OFF, which is added
-to the distance that they are compared with. A leaf is fitted to a pose when it is first needed. The exact
-distance is the same to the bit for all triangles that share the side or corner that is closest.
-"""
+"""Distances from samples to faces: bounds for LANES samples and a leaf of faces at once, and the exact one."""
 
 from __future__ import annotations
 
@@ -17,6 +12,10 @@ from reference_sim.kernels.lanes import bits_at_most, lowest_bit
 
 # LANES: faces of a leaf, leaves of a block and samples of a group
 QUANTITIES = 21  # of a face, for its bound
+# Bounds are in float32 and never above the true distance by more than a share of ROUND_OFF, which is
+# added to the distance that they are compared with. A leaf is fitted to a pose when it is first needed.
+# The exact distance is the same to the bit for all triangles that share the side or corner that is
+# closest.
 BOUND_MATH = {"nnan", "nsz", "reassoc", "contract"}  # for bounds alone, within ROUND_OFF
 ROUND_OFF = 3e-6  # of lengths, of the bounds: some fifty times that of float32
 # Squared sine of an angle of a triangle, below which its normal is round-off.

@@ -6,10 +6,6 @@ So each module's kernels are kept in a folder whose name holds a digest of the f
 with the same sources find the same folder.
 
 The folders lie in `__pycache__` beside the module, else in the user's cache folder, or in NUMBA_CACHE_DIR.
-
-A solver that serves any term gets the term's kernel when it runs. `kernel_argument` hands one over as an
-array whose one field is named after the kernel and the digest of its source. So numba's type of it names
-the kernel, which is compiled in, and found on disk again by another process.
 """
 
 from __future__ import annotations
@@ -140,6 +136,9 @@ def _folder(function: Any, digest: str) -> Path | None:
     return None
 
 
+# A solver that serves any term gets the term's kernel when it runs. `kernel_argument` hands one over as
+# an array whose one field is named after the kernel and the digest of its source. So numba's type of it
+# names the kernel, which is compiled in, and found on disk again by another process.
 @cache  # numba knows the dtype of a record again by its identity
 def kernel_argument(kernel: Dispatcher) -> np.ndarray:
     """Return what stands for a kernel of `kernel_cache.njit` among the arguments of another one."""

@@ -1,22 +1,9 @@
-"""Layouts of kernels that work on several elements side by side, by vector instructions.
-
-Float64: a kernel copies corners and constants of LANES_FLOAT64 elements into one array u of known size,
-row after row, works them out in a loop of fixed length without a branch, and hands the results out. Within
-one array the compiler knows that nothing overlaps.
-
-Float32: the state of early-stopped L-BFGS is u (3V,), the displacement [m] from a point x_0 that float64
-has; so round-off is that of a displacement of millimetres and not of a body metres away. Elements come in
-blocks of LANES, the last one filled up with elements of no stiffness; arrays of a block lie one
-quantity after the other.
-
-Rows: numba writes a short loop of known length out number by number, and what was stored in single
-numbers cannot be loaded as a vector before all of it has reached the cache. So rows are moved in vector
-registers.
-"""
+"""Layouts of kernels that work on several elements side by side, by vector instructions."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from math import isqrt, prod
 from typing import Any
@@ -30,6 +17,9 @@ from numba.extending import intrinsic
 from reference_sim.kernels.fast_kernels import LANES
 from reference_sim.kernels.kernel_cache import njit
 
+# A float64 kernel copies corners and constants of LANES_FLOAT64 elements into one array u of known size,
+# row after row, works them out in a loop of fixed length without a branch, and hands the results out.
+# Within one array the compiler knows that nothing overlaps.
 LANES_FLOAT64 = 8
 
 _STEEP = np.tan(np.pi / 8)
@@ -122,6 +112,10 @@ def _add(elements, blocks, slots, corners, size, base, stride, data):
                             data[at + i] += blocks[n, size * a + i, size * b + j]
 
 
+# The state of early-stopped L-BFGS is u (3V,), the displacement [m] from a point x_0 that float64 has;
+# so round-off is that of a displacement of millimetres and not of a body metres away. Elements come in
+# blocks of LANES, the last one filled up with elements of no stiffness; arrays of a block lie one
+# quantity after the other.
 SCRATCH = 24 * LANES  # numbers that a kernel may use for its own
 FAST = {"nnan", "nsz", "reassoc", "contract", "arcp"}
 TINY = np.float32(1e-30)
@@ -178,6 +172,9 @@ def set_edges(x, vertices, columns, out):
                     out[b, (3 * k + i) * LANES + g] = np.float32(x[other, i] - x[first, i])
 
 
+# numba writes a short loop of known length out number by number, and what was stored in single numbers
+# cannot be loaded as a vector before all of it has reached the cache. So rows are moved in vector
+# registers.
 WIDE = ir.IntType(64)
 _intrinsic: Any = intrinsic  # to a caller it has not the arguments of the function that types it
 
@@ -305,22 +302,67 @@ def add_run(_: Any, source: Any, i: Any, target: Any, j: Any, count: Any) -> Any
 
     What lies in the last vector beyond them is read, and in target written as it was.
     """
-    lanes = _lanes(source)
 
     def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        with cgutils.for_range_slice(builder, WIDE(0), args[4], WIDE(lanes), WIDE) as (at, _):
-            ends = [(args[0], builder.add(args[1], at)), (args[2], builder.add(args[3], at))]
-            first, second = (
-                _place(context, builder, (source, types.intp), end, 1, lanes) for end in ends
-            )
-            number = ir.Constant(ir.VectorType(WIDE, lanes), list(range(lanes)))
-            inside = builder.icmp_signed("<", number, _spread(builder, builder.sub(args[4], at), lanes))
-            zeros = ir.Constant(first.type.pointee, [0.0] * lanes)
-            numbers = builder.select(inside, builder.load(first, align=4), zeros)
-            builder.store(builder.fadd(builder.load(second, align=4), numbers), second, align=4)
+        with _each_vector(context, builder, source, args[4]) as (at, part):
+            numbers = part(source, args[0], builder.add(args[1], at))
+            end = (args[2], builder.add(args[3], at))
+            place = _place(context, builder, (target, types.intp), end, 1, _lanes(source))
+            builder.store(builder.fadd(builder.load(place, align=4), numbers), place, align=4)
         return context.get_dummy_value()
 
     return types.void(source, types.intp, target, types.intp, types.intp), build
+
+
+@_intrinsic
+def dot_rows(_: Any, rows: Any, i: Any, stride: Any, x: Any, j: Any, count: Any) -> Any:
+    """Return the products of TILE_ROWS rows, from i on a stride apart, with x from j on, of `count` numbers.
+
+    They are summed up in one order, whatever kernel that is compiled into: flat arrays of one dtype.
+    """
+    lanes = _lanes(rows)
+
+    def build(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        kind = ir.VectorType(context.get_value_type(rows.dtype), lanes)
+        totals = [cgutils.alloca_once_value(builder, ir.Constant(kind, None)) for _ in range(TILE_ROWS)]
+        with _each_vector(context, builder, rows, args[5]) as (at, part):
+            right = part(x, args[3], builder.add(args[4], at))
+            start = builder.add(args[1], at)
+            for a, total in enumerate(totals):
+                left = part(rows, args[0], builder.add(start, builder.mul(args[2], WIDE(a))))
+                product = builder.fmul(left, right, flags=("contract",))
+                builder.store(builder.fadd(builder.load(total), product, flags=("contract",)), total)
+        sums = []
+        for total in totals:
+            vector, half = builder.load(total), lanes // 2
+            while half:
+                upper = [half + n if n < half else n for n in range(lanes)]
+                upper = ir.Constant(ir.VectorType(ir.IntType(32), lanes), upper)
+                vector, half = (
+                    builder.fadd(vector, builder.shuffle_vector(vector, vector, upper)),
+                    half // 2,
+                )
+            sums.append(builder.extract_element(vector, ir.IntType(32)(0)))
+        return context.make_tuple(builder, signature.return_type, sums)
+
+    i64 = types.intp
+    return types.UniTuple(rows.dtype, TILE_ROWS)(rows, i64, i64, x, i64, i64), build
+
+
+@contextmanager
+def _each_vector(context: Any, builder: Any, array: Any, count: Any) -> Iterator[Any]:
+    """Loop over vectors of `count` numbers: yields their start, and a function that loads those inside."""
+    lanes = _lanes(array)
+    with cgutils.for_range_slice(builder, WIDE(0), count, WIDE(lanes), WIDE) as (at, _):
+        number = ir.Constant(ir.VectorType(WIDE, lanes), list(range(lanes)))
+        inside = builder.icmp_signed("<", number, _spread(builder, builder.sub(count, at), lanes))
+
+        def part(kind: Any, values: Any, start: Any) -> Any:
+            place = _place(context, builder, (kind, types.intp), (values, start), 1, lanes)
+            zeros = ir.Constant(place.type.pointee, None)
+            return builder.select(inside, builder.load(place, align=4), zeros)
+
+        yield at, part
 
 
 def _lanes(array: Any) -> int:

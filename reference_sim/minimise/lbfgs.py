@@ -5,9 +5,6 @@ dt^2, (mu + lambda/2) times the cotangent Laplacian, and the curvature of the co
 Kavan 2017). It is factorised once per minimisation and costs three triangular solves an iteration, so the
 first hundredth of the gap comes several times sooner than with Newton; the last digits do not. So Newton
 takes over where the relative residual is SWITCH, and its factorisations serve several steps each.
-
-What comes before Newton needs no more than float32. So it is compiled_lbfgs.CompiledLBFGS, where that has
-kernels for all terms, and goes on to COMPILED_SWITCH.
 """
 
 from __future__ import annotations
@@ -34,6 +31,8 @@ from reference_sim.potential import Potential
 if TYPE_CHECKING:
     from reference_sim.minimise.compiled_lbfgs import CompiledLBFGS
 
+# What comes before Newton needs no more than float32. So it is compiled_lbfgs.CompiledLBFGS, where that
+# has kernels for all terms, and goes on to COMPILED_SWITCH.
 SWITCH, COMPILED_SWITCH = 1.0, 0.1  # relative residuals at which Newton takes over
 PATIENCE = 100  # iterations after which it does in any case
 

@@ -4,13 +4,6 @@ Each iteration solves H p = -g and takes the full step. Where the Cholesky facto
 exist, a share of the elements' negative curvature is taken out, CONVEXITY at one projection level after
 another, and only when all of it was not enough (cloth without inertia) H is shifted by sigma M/dt^2.
 Taking all of it out always needs several times the iterations once cloth wrinkles.
-
-The minimum of stiff cloth lies along a narrow, curved valley of the energy. A full step along it ends
-where stresses computed from the strain are false by orders of magnitude. So the Hessian takes the
-stresses that the step predicted (Magisano, Leonetti and Garcea 2017). Where a full step raises the
-energy, up to WATCHDOG_STEPS further ones go on from there (the watchdog of Chamberlain et al. 1982). Only
-a point below their start is kept; if none comes, they are taken back, and a line search along the true
-Newton direction takes over.
 """
 
 from __future__ import annotations
@@ -39,6 +32,12 @@ from reference_sim.potential import Potential
 CONVEXITY = (0.0, 0.15, 0.3, 0.6, 1.0)
 MAX_SHIFT = 1e12  # beyond it a step is shorter than round-off
 STEP_TOLERANCE = 1e-3  # of a mean edge length
+# The minimum of stiff cloth lies along a narrow, curved valley of the energy. A full step along it ends
+# where stresses computed from the strain are false by orders of magnitude. So the Hessian takes the
+# stresses that the step predicted (Magisano, Leonetti and Garcea 2017). Where a full step raises the
+# energy, up to WATCHDOG_STEPS further ones go on from there (the watchdog of Chamberlain et al. 1982).
+# Only a point below their start is kept; if none comes, they are taken back, and a line search along the
+# true Newton direction takes over.
 WATCHDOG_AFTER = 20  # iterations: most steps of a garment end sooner
 WATCHDOG_STEPS = 40  # full steps in a row before the energy has to be below its start
 # Share of the predicted decrease from which on the quadratic model needs no help.

@@ -131,10 +131,7 @@ READERS: dict[str, tuple[Callable[[Path], object], Callable[[Path], object]]] = 
     "cache.pc2": (lambda path: write_point_cache(path, ROLLED_OUT), read_point_cache),
     "clip.amc": (lambda path: path.write_text(CLIP), read_amc),
     "skeleton.asf": (lambda path: path.write_text(cmu_like()), read_asf),
-    **{
-        f"mesh{ending}": (lambda path: MESH.write(path), read_cloth)
-        for ending in (".obj", ".ply", ".off")
-    },
+    **{f"mesh{ending}": (lambda path: MESH.write(path), read_cloth) for ending in (".obj", ".ply")},
     "trajectory.vtkhdf": (ROLLED_OUT.save, Trajectory.load),
     "model.safetensors": (write_model, TrainedModel.load),
 }

@@ -57,7 +57,8 @@ def test_what_begins_in_float32_ends_in_a_minimum_of_float64(monkeypatch):
     gradient = potential.value_and_gradient(descent.positions)[1][potential.cloth.free]
     assert np.abs(gradient).max() < 1e-6 * 9.81 * potential.cloth.masses.mean()
     restart = Newton(potential).minimise(descent.positions)
-    assert restart.status == "converged" and np.array_equal(restart.positions, descent.positions)
+    assert restart.status == "converged"
+    assert np.abs(restart.positions - descent.positions).max() < 1e-13  # both end at round-off
 
 
 def test_a_minimiser_that_served_gives_the_bits_of_a_new_one():
