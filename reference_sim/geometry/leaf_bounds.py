@@ -1,4 +1,4 @@
-"""Distances from samples to faces: bounds for LANES samples and a leaf of faces at once, and the exact one."""
+"""Distances from samples to faces: bounds for LANES samples and a leaf of faces at once, and exact ones."""
 
 from __future__ import annotations
 
