@@ -118,8 +118,8 @@ class Cholesky:
     def factorise(self, values: np.ndarray, *, kind: type = np.float64) -> bool:
         """Factorise the matrix with these values (nnz,).
 
-        Returns False if it is not positive definite; in np.float32 also if it is so nearly singular that
-        seven digits do not suffice.
+        Returns False if it is not positive definite, in np.float32 also if its seven digits do not
+        suffice.
         """
         self._kind = kind
         least = kind(LEAST_FLOAT32 if kind is np.float32 else 0.0)

@@ -318,7 +318,7 @@ def add_run(_: Any, source: Any, i: Any, target: Any, j: Any, count: Any) -> Any
 def dot_rows(_: Any, rows: Any, i: Any, stride: Any, x: Any, j: Any, count: Any) -> Any:
     """Return the products of TILE_ROWS rows, from i on a stride apart, with x from j on, of `count` numbers.
 
-    They are summed up in one order, whatever kernel that is compiled into: flat arrays of one dtype.
+    All are flat arrays of one dtype. Every kernel sums up in the same order.
     """
     lanes = _lanes(rows)
 
