@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     import numpy as np
 
 # [s] for which the process is watched once the clock has stopped, and again where it is at work
-AFTER = 0.05
+AFTER = 0.02
 # Times in a row; a machine that is busy elsewhere lends its time to one of them, not to all.
 WATCHES = 3
 BUSY = 0.3  # share of AFTER which the processor may be at work

@@ -63,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     order = (GONE, WORSE, BETTER, OTHER)
     counts = [f"{sum(c.verdict == v for c in comparison.changes)} {v}" for v in order]
     print(f"{comparison.compared} means compared: {', '.join(counts)}.")
-    machines = [", ".join(sorted({*run.frame["hardware"]})) for run in (one, other)]
+    machines = [", ".join(run.machines) for run in (one, other)]
     if machines[0] != machines[1]:
         print(f"No times compared: A ran on {machines[0]}, B on {machines[1]}.")
     if short and comparison.changes:

@@ -174,6 +174,8 @@ def compare(
         raise ResultsError(
             f"{place}: of protocol {clashes.iloc[0]} in A, {protocol} in B: another reference or scene"
         )
+    places = pair[0].set_index(CELL)["place"]
+    pair[1] = pair[1].assign(place=places.reindex(pair[1].set_index(CELL).index).to_numpy())
     lone_seeds = _find_lone_seeds(*of_metrics)
     networks = set(lone_seeds[1]["method"])
     pair = [frame[~(frame["seeded"] & frame["method"].isin(networks))] for frame in pair]

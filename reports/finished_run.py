@@ -183,10 +183,15 @@ class Run:
         return self.methods[method].label if method in self.methods else method
 
     @property
+    def machines(self) -> list[str]:
+        """Return the hardware that measured times of frames [ms]; trainings [s] may be of another."""
+        times = self.frame[(self.frame["unit"] == "ms") & self.frame["value"].notna()]
+        return sorted(set(times["hardware"]) - {""})
+
+    @property
     def warnings(self) -> list[str]:
         """Return what a reader has to know first: times of several machines, files that were edited."""
-        times = self.frame[self.frame["unit"].isin(("s", "ms")) & self.frame["value"].notna()]
-        machines = sorted(set(times["hardware"]) - {""})
+        machines = self.machines
         remarks = [f"Times are of several machines: {', '.join(machines)}"] if len(machines) > 1 else []
         if self.changed:
             remarks.append(f"Not as the run wrote them: {shorten(', '.join(self.changed), 100)}")

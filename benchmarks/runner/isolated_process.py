@@ -1,8 +1,8 @@
 """Work that may hang or crash: in a process of its own, ended at the deadline of a task, if it has one.
 
-A solver's own timeout is looked at between its iterations; a loop that never ends, or compiled code that
-takes the interpreter down with it, has to be stopped from outside. The process leads a group of its own,
-so that what it has started ends with it; and it ends by itself when the parent does, however that went.
+A solver looks at its own timeout between iterations; a loop that never ends, or compiled code that takes
+the interpreter down, has to be stopped from outside. The process leads a group of its own, so that what
+it has started ends with it; it also ends when the parent does.
 """
 
 from __future__ import annotations
@@ -36,7 +36,10 @@ PATIENCE = 2.0  # [s]
 # [s] for what a process does before its first task: it may compile every kernel
 COMPILING = 900.0
 # What every process loads: nothing that a scene may do without, as torch.
-LOADED_BY_ALL = ("h5py", "numba", "scipy.sparse.linalg", "reference_sim", "benchmarks.runner.cells")
+LOADED_BY_ALL = (
+    "h5py", "scipy.sparse.linalg", "reference_sim", "benchmarks.runner.cells",
+    "benchmarks.runner.numba_tables",
+)  # fmt: skip
 # What tasks of a scene with a body load: torch skins the garment.
 LOADED_BY_DRESSED = ("benchmarks.scenes.dressed_body", "snug.networks.dressed_body")
 
@@ -158,6 +161,7 @@ def end_group(pid: int) -> None:
 
 def _serve(pipe: Connection, folder: RunFolder, assets: Assets | None) -> None:
     lead_a_group()
+    gc.freeze()  # to look through all that is loaded takes each collection 0.1 s
     context = Context(folder, assets)
     while True:
         try:

@@ -1,9 +1,8 @@
 """`njit` whose compiled kernels on disk are never stale, and compiled kernels as arguments of others.
 
 numba keeps on disk what it compiled, and compiles a kernel anew when the kernel's own file has changed.
-It does not see a change in another file: in a kernel that is called, or in a constant that is imported.
-So each module's kernels are kept in a folder whose name holds a digest of the file and of both. Processes
-with the same sources find the same folder.
+It does not see changes in other files: of kernels that are called, or of imported constants.
+So each module's kernels are kept in a folder whose name holds a digest of the file and of both.
 
 The folders lie in `__pycache__` beside the module, else in the user's cache folder, or in NUMBA_CACHE_DIR.
 """
@@ -14,6 +13,7 @@ import contextlib
 import gc
 import hashlib
 import os
+import platform
 import tempfile
 import warnings
 from collections.abc import Callable
@@ -28,6 +28,7 @@ import numpy as np
 from filelock import FileLock
 from numba import typeof
 from numba.core.caching import InTreeCacheLocator
+from numba.core.codegen import get_host_cpu_features
 from numba.core.dispatcher import Dispatcher
 from numba.core.extending import _Intrinsic
 from numba.extending import overload
@@ -39,7 +40,12 @@ FLAGS = (set, frozenset)  # of fastmath
 _config: Any = numba.config
 if _config.DISABLE_JIT:  # in other processes that this one starts too
     warnings.warn("NUMBA_DISABLE_JIT is not heeded: kernels run compiled alone", stacklevel=2)
-    _config.DISABLE_JIT, os.environ["NUMBA_DISABLE_JIT"] = 0, "0"
+    _config.DISABLE_JIT = 0
+    os.environ["NUMBA_DISABLE_JIT"] = "0"
+if platform.machine() in ("x86_64", "AMD64") and _config.CPU_FEATURES is None:
+    # LLVM sums up in vectors of one width, so that a simulation is the same on each of these processors.
+    features = f"{get_host_cpu_features()},+prefer-256-bit"
+    _config.CPU_FEATURES = os.environ["NUMBA_CPU_FEATURES"] = features
 _digests: dict[str, str] = {}  # of modules that hold kernels, by name
 _folders: dict[str, Path | None] = {}
 

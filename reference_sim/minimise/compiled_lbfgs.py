@@ -24,6 +24,8 @@ from reference_sim.minimise.descent import (
     SUFFICIENT_DECREASE,
     TOLERANCE,
     Result,
+    add_scaled,
+    dot,
     mean_weight,
 )
 from reference_sim.potential import HessianPattern, Potential
@@ -85,27 +87,11 @@ def precondition(stiffening, factor):
     return factorise(values, factor.layout, factor.room, np.float32(0.0))
 
 
-@njit(cache=True, fastmath=FAST)
-def dot(a, b):
-    """Return the inner product of a and b (n,), in float32."""
-    total = np.float32(0.0)
-    for i in range(len(a)):
-        total += a[i] * b[i]
-    return total
-
-
 @njit(cache=True)
 def copy(source, target):
     """Copy n numbers: numba takes two seconds to compile an assignment to a slice."""
     for i in range(len(target)):
         target[i] = source[i]
-
-
-@njit(cache=True, fastmath=FAST)
-def add_scaled(a, scale, b):
-    """Add scale times b to a (n,)."""
-    for i in range(len(a)):
-        a[i] += scale * b[i]
 
 
 @njit(cache=True)
@@ -148,7 +134,8 @@ def descend(
         for back in range(pairs - 1, -1, -1):
             k = (newest - back) % size
             add_scaled(p, alphas[k] - memory.rho[k] * dot(memory.Y[k], p), memory.S[k])
-        slope, share, accepted, trial_value = dot(gradient, p), np.float32(1.0), False, value
+        slope, trial_value = dot(gradient, p), value
+        share, accepted = np.float32(1.0), False
         if counts[0] == 0:
             share = np.float32(first_step)
         for _ in range(HALVINGS if slope < 0 else 0):

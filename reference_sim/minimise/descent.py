@@ -17,9 +17,20 @@ from reference_sim.potential import Potential
 LEAST_CURVATURE = 1e-10
 
 
-def dot(a: np.ndarray, b: np.ndarray) -> float:
-    """Return a . b of two (n,), not by BLAS, whose threads cost time and change the last digit."""
-    return float(np.einsum("i,i", a, b))
+@njit(cache=True, fastmath={"reassoc", "contract", "nsz"})  # sums in vector instructions
+def dot(a, b):
+    """Return a . b of two (n,), not by BLAS, whose threads change the last digit."""
+    total = np.float32(0.0)  # float64 in their sum, if they are
+    for i in range(len(a)):
+        total += a[i] * b[i]
+    return total
+
+
+@njit(cache=True, fastmath={"contract"})
+def add_scaled(a, scale, b):
+    """Add scale times b to a (n,)."""
+    for i in range(len(a)):
+        a[i] += scale * b[i]
 
 
 class LBFGSHistory:
@@ -45,7 +56,8 @@ class LBFGSHistory:
             if self._pairs.shape[2] != len(s):
                 self._pairs = np.empty((self._memory, 2, len(s)))
             place = self._count % self._memory
-            self._pairs[place, 0], self._pairs[place, 1], self._curvatures[place] = s, y, curvature
+            self._pairs[place, 0], self._pairs[place, 1] = s, y
+            self._curvatures[place] = curvature
             self._count += 1
 
     def direction(self, g: np.ndarray, solve: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
@@ -62,31 +74,20 @@ class LBFGSHistory:
         return p
 
 
-SUM_MATH = {"reassoc", "contract", "nsz"}  # sums in vector instructions
-
-
-@njit(cache=True, fastmath=SUM_MATH)
+@njit(cache=True)
 def first_loop(pairs, curvatures, order, q, alphas):
     """Run from the newest pair to the oldest: set alphas (k,); q (3n,) is then ready for the first guess."""
     for k in range(len(order) - 1, -1, -1):
-        s, y, total = pairs[order[k], 0], pairs[order[k], 1], 0.0
-        for i in range(len(q)):
-            total += s[i] * q[i]
-        alphas[k] = total / curvatures[order[k]]
-        for i in range(len(q)):
-            q[i] -= alphas[k] * y[i]
+        alphas[k] = dot(pairs[order[k], 0], q) / curvatures[order[k]]
+        add_scaled(q, -alphas[k], pairs[order[k], 1])
 
 
-@njit(cache=True, fastmath=SUM_MATH)
+@njit(cache=True)
 def second_loop(pairs, curvatures, order, p, alphas):
     """Run from the oldest pair to the newest: p (3n,) becomes the direction."""
     for k in range(len(order)):
-        s, y, total = pairs[order[k], 0], pairs[order[k], 1], 0.0
-        for i in range(len(p)):
-            total += y[i] * p[i]
-        share = alphas[k] - total / curvatures[order[k]]
-        for i in range(len(p)):
-            p[i] += share * s[i]
+        share = alphas[k] - dot(pairs[order[k], 1], p) / curvatures[order[k]]
+        add_scaled(p, share, pairs[order[k], 0])
 
 
 STATUSES = {"converged": 0, "max_iterations": 1, "stalled": 1, "timeout": 2, "diverged": 3}  # how bad

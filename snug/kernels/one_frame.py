@@ -24,23 +24,13 @@ _C2, _C3, _C4, _C5, _C6 = (np.float32(1.0 / n) for n in (2, 6, 24, 120, 720))
 
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
-def skin_frame(
-    offsets: np.ndarray,
-    rest: np.ndarray,
-    first: np.ndarray,
-    joints: np.ndarray,
-    shares: np.ndarray,
-    order: np.ndarray,
-    transforms: np.ndarray,
-    pelvis: np.ndarray,
-    out: np.ndarray,
-) -> None:
+def skin_frame(offsets, rest, first, joints, shares, order, transforms, pelvis, out):
     """Write world vertices into out (V, 3) [m], float64, by linear blend skinning.
 
     offsets (3 V',) and rest (3, V'), the unposed garment [m]: in this order (V,) of vertices and with
     others behind them, in blocks of VERTEX_BLOCK; joints[first[b]:first[b + 1]] move block b, with shares
     (., VERTEX_BLOCK).
-    transforms (J, 3, 4). pelvis (3,) [m] is float64, all other real numbers are float32.
+    transforms (J, 3, 4). pelvis (3,) [m] is float64, other real numbers are float32.
     """
     count, padded = len(order), rest.shape[1]
     # Points and their images: nothing overlaps in one small array.
@@ -66,20 +56,20 @@ def skin_frame(
 
 @njit(cache=True, fastmath=FAST, error_model="numpy")
 def run_frame(
-    operations: np.ndarray,
-    weights: np.ndarray,
-    terms: np.ndarray,
-    features: np.ndarray,
-    rest: np.ndarray,
-    first: np.ndarray,
-    joints: np.ndarray,
-    shares: np.ndarray,
-    order: np.ndarray,
-    transforms: np.ndarray,
-    pelvis: np.ndarray,
-    work: np.ndarray,
-    out: np.ndarray,
-) -> None:
+    operations,
+    weights,
+    terms,
+    features,
+    rest,
+    first,
+    joints,
+    shares,
+    order,
+    transforms,
+    pelvis,
+    work,
+    out,
+):
     """Write world vertices into out (V, 3) [m], float64, and the next state into work.
 
     operations (n, 7): kind, rows, columns, and where its weights, terms, what it reads and what it writes

@@ -65,7 +65,8 @@ class Trainer:
         if not motions:
             raise TrainingError("no motions to train on")
         spec = find_kind(kind)
-        self.kind, self.spec, self.recipe, self.steps, self.seed = kind, spec, recipe, steps, seed
+        self.kind, self.spec, self.recipe = kind, spec, recipe
+        self.steps, self.seed = steps, seed
         self.device = device
         self.kernels = device.type == "cpu" if kernels is None else kernels
         self.posed_by = FastSkin.apply if self.kernels else compile_for(skin, device)

@@ -138,7 +138,7 @@ FAULTS = (
           "values[self._pattern.diagonal] = shift * self.metric"),
     Fault("half Newton steps", "Descent.spread", "step[self.free] = p.reshape(-1, 3)",
           "step[self.free] = 0.5 * p.reshape(-1, 3)"),
-    Fault("L-BFGS adds what it should take away", "first_loop", "q[i] -= alphas", "q[i] += alphas"),
+    Fault("L-BFGS adds what it should take away", "first_loop", "-alphas[k]", "alphas[k]"),
     Fault("L-BFGS pairs the gradient alone", "Descent.quasi_newton_step",
           "history.add(alpha * p, self.g - g)", "history.add(alpha * p, self.g)"),
     Fault("block transposed in the sparse matrix", "_block_keys", "key = column * n + row",

@@ -306,6 +306,12 @@ def test_the_chief_metrics_of_each_method_stand_in_few_lines_snug_first(tmp_path
     assert rest[-1] == "Each change: --metrics '*'"
 
 
+def test_a_scene_of_another_suite_is_compared_where_the_earlier_run_has_it():
+    moved = [replace(a_row, suite="speed") if a_row.scene == SCENES[0] else a_row for a_row in a_run()]
+    assert compare(run_of(a_run()), run_of(moved)).changes == ()
+    assert compare(run_of(moved), run_of(a_run())).changes == ()
+
+
 @pytest.mark.parametrize(
     ("b", "options", "says"),
     [

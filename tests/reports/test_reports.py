@@ -162,6 +162,7 @@ def test_page_one_names_the_files_that_are_not_as_the_run_wrote_them(tmp_path):
 
 def test_times_of_several_machines_are_named():
     times = [row(method=method, metric="cost/frame", unit="ms") for method in ("snug", "pbns")]
-    assert run_of(times).warnings == []
+    trained = replace(times[0], metric="cost/train", unit="s", hardware="another")  # before its frames
+    assert run_of([*times, trained]).warnings == []
     (warning,) = run_of([times[0], replace(times[1], hardware="another")]).warnings
     assert warning == "Times are of several machines: another, here"
