@@ -110,8 +110,7 @@ def _rasterise(corners: np.ndarray, w: int, h: int) -> tuple[np.ndarray, np.ndar
     area = ab[:, 0] * ac[:, 1] - ab[:, 1] * ac[:, 0]
     faces = np.flatnonzero((high > low).all(axis=1) & (area != 0.0))  # edge-on: covers nothing
     low, spans, first, area = low[faces], (high - low)[faces], first[faces], area[faces, None]
-    # Weights of the second and third corner are linear in the pixel: slopes and the value at the low
-    # corner.
+    # Weights of the second and third corner are linear in the pixel: slopes, value at the low corner.
     slopes = [
         np.stack([ac[faces, 1], -ac[faces, 0]], axis=1) / area,
         np.stack([-ab[faces, 1], ab[faces, 0]], axis=1) / area,

@@ -263,8 +263,7 @@ class ContactPenalty(Energy):
         self.rest_samples = self.sample_matrix @ cloth.rest_positions
         self.planes: Planes | None = None
         self.step: Step | None = None  # that the planes belong to
-        # Until a step is prepared every plane lies far below its sample: no contact. Finite also as
-        # float32.
+        # Until a step is prepared every plane lies far below its sample, finite also as float32: no contact.
         self.points = np.tile([0.0, -1e30, 0.0], (len(self.stencils), 1))
         self.normals = np.tile([0.0, 1.0, 0.0], (len(self.stencils), 1))
 

@@ -14,8 +14,7 @@ from reference_sim.kernels.lanes import bits_at_most, lowest_bit
 QUANTITIES = 21  # of a face, for its bound
 # Bounds are in float32 and never above the true distance by more than a share of ROUND_OFF, which is
 # added to the distance that they are compared with. A leaf is fitted to a pose when it is first needed.
-# The exact distance is the same to the bit for all triangles that share the side or corner that is
-# closest.
+# The exact distance is the same to the bit for all triangles that share the closest side or corner.
 BOUND_MATH = {"nnan", "nsz", "reassoc", "contract"}  # for bounds alone, within ROUND_OFF
 ROUND_OFF = 3e-6  # of lengths, of the bounds: some fifty times that of float32
 # Squared sine of an angle of a triangle, below which its normal is round-off.

@@ -74,7 +74,10 @@ class FactorisedHessian:
         return max(self.flat, 1e-13 * self.stiffest(values)) / self.metric
 
 
-POWER = 8  # inverse iterations for the direction of most negative curvature
+POWER, MOST_POWER = (
+    8,
+    64,
+)  # inverse iterations for a direction of negative curvature, at least and at most
 FIRST_ESCAPE = 100  # of the step tolerance: first length of the step along it
 LAST_SHIFT = 1e12  # in units of M/dt^2
 
@@ -134,14 +137,16 @@ def escape_saddle(run: NewtonRun, values: np.ndarray, length: float) -> bool:
 
 
 def find_lowest_mode(run: NewtonRun, values: np.ndarray) -> np.ndarray | None:
-    """Return the direction (3n,) of most negative curvature by inverse iteration, or None."""
-    shift = 1.0
+    """Return a direction (3n,) of negative curvature, nearly the lowest, by inverse iteration, or None."""
+    shift, metric = 1.0, run.hessian.metric
     while not run.factorise(values, shift):
         shift *= 4
         if shift > LAST_SHIFT:
             return None
     v = np.random.default_rng(0).standard_normal(len(run.g))
-    for _ in range(POWER):
-        v = run.hessian.solve(run.hessian.metric * v)
-        v = v / np.abs(v).max()
-    return v
+    for count in range(MOST_POWER):
+        above = v / np.abs(v).max()
+        v = run.hessian.solve(metric * above)
+        if count >= POWER and shift * dot(metric * above, v) > dot(metric * above, above):
+            break  # the Rayleigh quotient is below zero
+    return v / np.abs(v).max()

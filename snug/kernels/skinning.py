@@ -75,8 +75,7 @@ class FastSkin(torch.autograd.Function):
         return columns.unflatten(2, (frames, windows)).permute(3, 2, 0, 1), None, None
 
 
-# The point is copied into one small array of known size, for the compiler then knows that nothing
-# overlaps.
+# Each point is copied into a small array of known size: the compiler then knows that nothing overlaps.
 @njit(cache=True, fastmath={"contract"}, error_model="numpy")
 def _pose(points: np.ndarray, weights: np.ndarray, entries: np.ndarray, out: np.ndarray) -> None:
     """Pose flat points (V, 3, C, L) by weights (V, J), entries (C, J, 12 L) into flat out (C, V, 3, L)."""

@@ -98,8 +98,7 @@ WALK = Stride(
 )  # fmt: skip
 
 # Approximate values of the curves for running in T. F. Novacheck, The biomechanics of running,
-# Gait and Posture 7 (1998), about 3.2 m/s, and of the arm swing he describes: elbows held near 90
-# degrees.
+# Gait and Posture 7 (1998), about 3.2 m/s, and of its arm swing: elbows held near 90 degrees.
 RUN = Stride(
     seconds=0.72,
     hip=((0, 38), (10, 34), (20, 19), (30, 4), (38, -5), (46, -4), (56, 16), (66, 42), (76, 56), (86, 53),
