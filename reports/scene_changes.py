@@ -28,6 +28,8 @@ TOLERANCE = 0.05  # share of any other answer
 TIME_TOLERANCE = 0.2  # share of a time or memory that was repeated
 # share of the median method's value; a smaller difference is none, whatever it is a share of
 FLOOR = 1e-4
+# Differences that are none, in a metric's own unit; a lag is searched in steps of 0.01 frames.
+ROUND_OFF, LAG_STEPS = 1e-12, 0.02
 # Times the reference's noise, beyond which an answer that nothing repeats has changed.
 SPREADS = 3.0
 
@@ -53,6 +55,11 @@ def tolerance_of(metric: Metric) -> float:
         return TIME_TOLERANCE
     of_energy = metric.name.startswith(("energy/", "relative_excess/"))
     return ENERGY_TOLERANCE if of_energy else TOLERANCE
+
+
+def floor_of(metric: Metric, scale: float) -> float:
+    """Return the largest difference that is none; scale: the median value."""
+    return max(FLOOR * scale, LAG_STEPS if metric.name.endswith("lag") else ROUND_OFF)
 
 
 def side(metric: Metric, before: float, after: float, difference: float) -> str:
@@ -88,7 +95,7 @@ def is_negligible(metric: Metric, mean: Mean, new_mean: Mean, shift: Effect, sca
 
     scale: the median method's value there; unit of a difference whose unit is unknown.
     """
-    if abs(new_mean.value - mean.value) <= FLOOR * scale:
+    if abs(new_mean.value - mean.value) <= floor_of(metric, scale):
         return True
     share = tolerance_of(metric)
     limit = share * (shift.unit or scale) if shift.scale == DIFFERENCE else math.log1p(share)
@@ -151,13 +158,14 @@ def _differences(metric: Metric, rows: pd.DataFrame, spreads: float) -> pd.DataF
     draws = pd.factorize(rows["seed"] * 2 + run)[0]
     scatter, freedom = _scatter(scaled - np.stack([before, after])[run, places], places, draws)
     median = float(np.median(np.abs(old_means)))
+    floor = floor_of(metric, median)
     noise = spreads * np.hypot(*means_of(rows["uncertainty"].fillna(0.0).to_numpy()))
     share = tolerance_of(metric)
     if positive:
-        limit = np.maximum(math.log1p(share), np.log1p((FLOOR * median + noise) / old_means))
+        limit = np.maximum(math.log1p(share), np.log1p((floor + noise) / old_means))
     else:
         unit = 100.0 if relative else np.maximum(np.abs(old_means), median)
-        limit = np.maximum(np.maximum(share * unit, FLOOR * median), noise)
+        limit = np.maximum(np.maximum(share * unit, floor), noise)
     # On a scale of logarithms a fall by as much is farther than a rise.
     limit = np.where(np.abs(new_means - old_means) <= noise, np.inf, limit)
     error = scatter * np.sqrt((1.0 / counts).reshape(-1, 2).sum(axis=1))

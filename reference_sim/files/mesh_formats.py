@@ -23,8 +23,7 @@ PLY_NUMBERS = {
     "int64": "q", "uint64": "Q", "float32": "f", "float64": "d",
 }  # fmt: skip
 PLY_ORDER = {"ascii": "text", "binary_little_endian": "<", "binary_big_endian": ">"}
-# Points, polygons, texture coordinates, and places in these parallel to polygons, -1 for a corner
-# without.
+# Points, polygons, texture coordinates, and their places along polygons, -1 for a corner without.
 Contents = tuple[Any, Sequence[Any], Any, Sequence[Any]]
 
 

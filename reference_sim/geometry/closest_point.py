@@ -219,8 +219,7 @@ class FaceSearch:
         place = np.argsort(order)
         leaves = -(-len(order) // LANES)
         order = np.append(order, np.repeat(order[-1], LANES * leaves - len(order)))
-        # Corners by ascending vertex: faces then agree to the bit about a side or a corner that they
-        # share.
+        # Corners by ascending vertex: faces then agree to the bit about a side or corner that they share.
         ascending = np.argsort(self.faces[order], axis=1, kind="stable")
         vertices = np.take_along_axis(self.faces[order], ascending, axis=1)
         blocks = -(-leaves // LANES)

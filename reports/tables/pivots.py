@@ -88,8 +88,7 @@ def pivot(
     return metrics, sorted(lines, key=order)
 
 
-# A term that is left out of the loss is of course larger; the total is the base's own loss, curvature is
-# nobody's.
+# A term left out is larger, of course; the total is the base's own loss, curvature is nobody's.
 COMPARED = ("energy/total", "curvature/histogram", "penetration/vertices", "roll_out/drift")
 
 

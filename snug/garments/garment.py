@@ -18,8 +18,7 @@ from snug.body.skeleton import JOINT_NAMES
 from snug.garments.implicit_surface import joint_position, skin_following
 
 SHAPE_SMOOTHING = 10  # rounds over a shape's displacement, which jumps from leg to leg
-# Rounds over the weights at 1000 vertices of cloth that spans both thighs: between them it follows
-# neither.
+# Rounds over the weights at 1000 vertices of cloth between the thighs: there it follows neither.
 SKIRT_SMOOTHING = 60
 
 

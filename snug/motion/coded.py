@@ -84,8 +84,7 @@ class Stride:
 # Approximate values of the mean curves of D. A. Winter, The Biomechanics and Motor Control of Human Gait
 # (University of Waterloo Press), natural cadence: 105 steps per minute. Ankle dorsiflexion is positive.
 # Pelvis: Perry, Gait Analysis (1992), 5 degrees of rotation, 4 of obliquity. Arms: Murray et al.,
-# Patterns of sagittal rotation of the upper limbs in walking, Physical Therapy 47 (1967), about 32
-# degrees.
+# Patterns of sagittal rotation of the upper limbs in walking, Physical Therapy 47 (1967), 32 degrees.
 WALK = Stride(
     seconds=1.14,
     hip=((0, 21), (10, 17), (20, 9), (30, 0), (40, -7), (50, -11), (60, -6), (70, 8), (80, 18), (90, 22)),

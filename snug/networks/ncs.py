@@ -28,8 +28,7 @@ from snug.motion.motion import Motion
 from snug.networks.frame_layout import FramePlan
 from snug.networks.garment_network import GarmentNetwork, perceptron
 
-# Those of the published configuration for SMPL: what carries clothes, without shanks, feet, hands and
-# head.
+# Of the published configuration for SMPL what carries clothes: no shanks, feet, hands and head.
 DESCRIBED = (
     "pelvis", "left_hip", "right_hip", "spine1", "left_knee", "right_knee", "spine2", "spine3", "neck",
     "left_collar", "right_collar", "left_shoulder", "right_shoulder", "left_elbow", "right_elbow",

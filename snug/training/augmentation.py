@@ -33,8 +33,7 @@ BODY_PARTS: tuple[tuple[str, ...], ...] = (
 # Of legs and spine; an arm swung further might enter the torso.
 PART_SCALES = dict.fromkeys((1, 2, 3), (0.6, 1.3))
 # Degrees between upper arm and spine where an arm of a clip comes nearest. The lower end is where
-# recorded arms are spread to (snug.motion.motion.ARMS_CLEAR): nearer, a sleeve is pinched and no shape is
-# good.
+# recorded arms are spread to (snug.motion.motion.ARMS_CLEAR): nearer, sleeves are pinched.
 ARM_DEGREES = (25.0, 50.0)
 # Degrees between thigh and spine: a hip bends by about 120 and no further. At 40, as a squat under the
 # spine of a bow has it, thighs enter the belly, and no hem between them is free.

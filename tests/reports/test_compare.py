@@ -11,7 +11,7 @@ import pytest
 from benchmarks.results.row import ResultsError, Row
 from reports import compare as command
 from reports.comparison import compare
-from reports.scene_changes import FAILING
+from reports.scene_changes import FAILING, OTHER, WORSE
 from tests.reports.report_folder import row, run_folder, run_of
 
 SCENES = tuple(f"tshirt/motion_{k}" for k in range(8))
@@ -304,6 +304,20 @@ def test_the_chief_metrics_of_each_method_stand_in_few_lines_snug_first(tmp_path
     assert "| SNUG |" in snug and "2.00 → 2.75 one seed" in snug
     assert "| 1.00 → 4.00 worse |" in simulation and "| 3.00 → 3.00 same |" in solver
     assert rest[-1] == "Each change: --metrics '*'"
+
+
+@pytest.mark.parametrize(
+    ("metric", "before", "after", "verdicts"),
+    [
+        ("gap/energy", 0.0, 2.8e-17, []),
+        ("gap/energy", 0.0, 1e-6, [WORSE]),
+        ("dynamics/lag", -0.18, -0.19, []),
+        ("dynamics/lag", -0.18, -0.30, [OTHER]),
+    ],
+)
+def test_round_off_and_a_step_of_the_search_for_a_lag_are_no_change(metric, before, after, verdicts):
+    runs = [run_of([row(SCENES[0], "simulation", metric, value)]) for value in (before, after)]
+    assert [change.verdict for change in compare(*runs).changes] == verdicts
 
 
 def test_a_scene_of_another_suite_is_compared_where_the_earlier_run_has_it():
