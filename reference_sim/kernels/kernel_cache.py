@@ -67,7 +67,10 @@ def njit(**options: Any) -> Callable[[Any], Any]:
         locators = _config.CACHE_LOCATOR_CLASSES
         _config.CACHE_LOCATOR_CLASSES = f"{__name__}.{KernelLocator.__name__}"
         try:
-            kernel = numba.njit(**(options | {"cache": folder is not None}))(function)
+            # no wrapper for callers in C, of which there are none: it is a seventh of the time to compile
+            kernel = numba.njit(**options | {"cache": folder is not None, "no_cfunc_wrapper": True})(
+                function
+            )
         finally:
             _config.CACHE_LOCATOR_CLASSES = locators
         if folder:

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
+
 import pytest
 
 from benchmarks.results.run_folder import RunFolder
@@ -184,3 +188,21 @@ def test_the_time_left_never_grows_and_a_stage_begins_with_a_line(capsys):
     assert times == sorted(times, reverse=True) and times[-1] < times[0]
     lines = capsys.readouterr().err.splitlines()
     assert [line.partition(";")[0] for line in lines] == ["part 0: 5 tasks", "part 1: 5 tasks"]
+
+
+FEATURES = (
+    "import reference_sim.kernels.kernel_cache\nfrom numba.core.registry import cpu_target\n"
+    "print(cpu_target.target_context.codegen().magic_tuple()[2])"
+)
+TASK = (
+    "from benchmarks.runner.isolated_process import start_loading\n"
+    f"process = start_loading().Process(target=exec, args=({FEATURES!r},))\nprocess.start()\nprocess.join()"
+)
+
+
+def test_processes_of_tasks_compile_for_the_same_processor_as_the_run_does():
+    variables = {k: v for k, v in os.environ.items() if k != "NUMBA_CPU_FEATURES"}
+    features = [
+        subprocess.check_output([sys.executable, "-c", c], env=variables) for c in (FEATURES, TASK)
+    ]
+    assert features[0] == features[1] != b""
