@@ -35,7 +35,7 @@ from reference_sim.kernels.lanes import LANES as L
 if TYPE_CHECKING:
     from reference_sim.energies.bend_hinge import BendHinge
 
-PI, TWO_PI = np.float32(np.pi), np.float32(2 * np.pi)
+PI, TWO_PI, PER_TURN = np.float32(np.pi), np.float32(2 * np.pi), np.float32(0.5 / np.pi)
 # arctan(t) = t p(t^2) on [0, 1]; a Chebyshev fit, at most 4e-8 off.
 P0, P1, P2, P3, P4, P5, P6, P7 = (
     np.float32(value)
@@ -91,7 +91,7 @@ def _bending(x, hinges, stiffness, rest, values, gradients):
                 cx, cy, cz = ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx
                 sine = (cx * ex + cy * ey + cz * ez) * inverse
                 theta = arctan2(sine, ax * bx + ay * by + az * bz) - angle
-                theta -= TWO_PI * np.floor((theta + PI) / TWO_PI)
+                theta -= TWO_PI * np.floor((theta + PI) * PER_TURN)
                 s = k * theta
                 energy[n] = HALF * s * theta
                 a, b = s / (ax * ax + ay * ay + az * az), s / (bx * bx + by * by + bz * bz)
@@ -167,7 +167,7 @@ def hinge_gradient(data, u, gradient, s):
             )
             cosine = -(ax * bx + ay * by + az * bz)
             angle = arctan2(sine, cosine) - c[L + g]
-            angle -= TWO_PI * np.floor((angle + PI) / TWO_PI)
+            angle -= TWO_PI * np.floor((angle + PI) * PER_TURN)
             stiffness = c[g]
             energy += HALF * stiffness * angle * angle
             force = stiffness * angle

@@ -138,7 +138,7 @@ class Constraints:
 
 LANES = 16  # float32 numbers that a kernel works on side by side, so many of whatever they belong to
 # No assumption on NaN or infinity: the guard of training must see them.
-GUARDED = {"reassoc", "contract", "arcp", "nsz"}
+GUARDED = {"reassoc", "contract", "nsz"}
 
 # x (C, V, 3, LANES) float32 [m] -> values (C, LANES) [J]; the second argument is like
 # x, and the gradients [N] are added to it. The function for "training_batch" returns one.

@@ -36,6 +36,8 @@ from numba.misc.appdirs import AppDirs
 
 CONSTANTS = (bool, int, float, complex, str, tuple, np.generic)
 FLAGS = (set, frozenset)  # of fastmath
+# These let LLVM take the processor's estimates of 1/x and 1/sqrt(x), whose digits are its maker's.
+ESTIMATING = {"fast", "arcp", "afn"}
 
 _config: Any = numba.config
 if _config.DISABLE_JIT:  # in other processes that this one starts too
@@ -55,7 +57,13 @@ def njit(**options: Any) -> Callable[[Any], Any]:
 
     What a kernel takes from another file is to be imported above the first kernel of its own file. Where
     no folder can be written, every process compiles for itself.
+
+    Raises:
+        ValueError: fastmath of other digits on another processor.
     """
+    fastmath = options.get("fastmath") or set()
+    if fastmath is True or not ESTIMATING.isdisjoint(fastmath):
+        raise ValueError(f"njit(fastmath={fastmath}): leave out {', '.join(sorted(ESTIMATING))}")
 
     def decorate(function: Any) -> Any:
         module = function.__module__

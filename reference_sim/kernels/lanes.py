@@ -117,7 +117,7 @@ def _add(elements, blocks, slots, corners, size, base, stride, data):
 # blocks of LANES, the last one filled up with elements of no stiffness; arrays of a block lie one
 # quantity after the other.
 SCRATCH = 24 * LANES  # numbers that a kernel may use for its own
-FAST = {"nnan", "nsz", "reassoc", "contract", "arcp"}
+FAST = {"nnan", "nsz", "reassoc", "contract"}
 TINY = np.float32(1e-30)
 HALF, ONE, TWO, THREE = np.float32(0.5), np.float32(1.0), np.float32(2.0), np.float32(3.0)
 

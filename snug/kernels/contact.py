@@ -152,7 +152,7 @@ def _height(
 
 
 # No assumption on NaN or infinity: the guard of training must see them.
-@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "arcp", "nsz"})
+@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
 def contact_energy(
     x: np.ndarray, stencils: np.ndarray, weights: np.ndarray, stiffness: np.ndarray, margin: np.float32,
     power: int, frames: np.ndarray, rows: np.ndarray, positions: np.ndarray, normals: np.ndarray,

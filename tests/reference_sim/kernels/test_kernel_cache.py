@@ -11,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from reference_sim.kernels.kernel_cache import njit
+
 ROOT = Path(__file__).resolve().parents[3]
 FILES = {
     "deep.py": "@njit(cache=True)\ndef deepest(x):\n    return x + 1\n",
@@ -103,3 +105,9 @@ def test_a_sum_has_the_same_digits_on_processors_that_prefer_other_vectors(tmp_p
         for name in ("skylake-avx512", "znver4")
     ]
     assert sums[0] == sums[1]
+
+
+@pytest.mark.parametrize("fastmath", [True, {"nsz", "arcp"}, {"afn"}])
+def test_a_kernel_of_estimated_reciprocals_is_refused(fastmath):
+    with pytest.raises(ValueError, match=r"leave out afn, arcp, fast$"):
+        njit(fastmath=fastmath)
