@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from datetime import datetime
 from pathlib import Path
 from textwrap import shorten
@@ -18,7 +18,7 @@ from reports.blocks import BLOCKS, Report, TableBlock
 from reports.figures.plotting import Figure, escape
 from reports.finished_run import Run
 from reports.sentences import headline
-from reports.tables.table import CellText, Column, Table, column_texts, remarks_below
+from reports.tables.table import CellText, Table, column_texts, remarks_below
 
 # Of run.json, which has all.
 SHOWN = (
@@ -80,24 +80,21 @@ def lay_out_table(run: Run, table: Table) -> Values:
     groups: dict[str, list[list[CellText]]] = {}
     for row, line in zip(table.rows, lines):
         groups.setdefault(" · ".join(str(row[k]) for k in heads), []).append(line)
+    # Columns of numbers share evenly; with texts among them each takes what it needs.
+    widths = ["1.4fr" if len(columns) <= FEW else "2.4fr", *["1fr"] * (len(columns) - 1)]
+    if any(column.text for column in columns[1:]):
+        widths = ["auto"] * len(columns)
     return {
         "kind": "table",
         "caption": table.caption,
         "note": remarks_below(table, lines),
         "columns": [
             {"title": column.title, "unit": column.unit_above, "left": column.text, "width": width}
-            for column, width in zip(columns, _widths(columns))
+            for column, width in zip(columns, widths)
         ],
         "groups": [{"title": title, "rows": rows} for title, rows in groups.items()],
         "breakable": len(table.rows) > UNBROKEN,
     }
-
-
-def _widths(columns: Sequence[Column]) -> list[str]:
-    """Return widths: columns of numbers share evenly; with texts among them each takes what it needs."""
-    if all(not column.text for column in columns[1:]):
-        return ["1.4fr" if len(columns) <= FEW else "2.4fr", *["1fr"] * (len(columns) - 1)]
-    return ["auto"] * len(columns)
 
 
 DEFINED = ("energies", "curvature", "cost", "overview")  # tables whose metrics are defined

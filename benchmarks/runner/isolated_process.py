@@ -37,8 +37,7 @@ PATIENCE = 2.0  # [s]
 COMPILING = 900.0
 # What every process loads: nothing that a scene may do without, as torch.
 LOADED_BY_ALL = (
-    "h5py", "scipy.sparse.linalg", "reference_sim", "benchmarks.runner.cells",
-    "benchmarks.runner.numba_tables",
+    "h5py", "scipy.sparse.linalg", "reference_sim.kernels.kernel_cache", "benchmarks.runner.cells",
 )  # fmt: skip
 # What tasks of a scene with a body load: torch skins the garment.
 LOADED_BY_DRESSED = ("benchmarks.scenes.dressed_body", "snug.networks.dressed_body")

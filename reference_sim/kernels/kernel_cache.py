@@ -31,6 +31,7 @@ from numba.core.caching import InTreeCacheLocator
 from numba.core.codegen import get_host_cpu_features
 from numba.core.dispatcher import Dispatcher
 from numba.core.extending import _Intrinsic
+from numba.core.registry import cpu_target
 from numba.extending import overload
 from numba.misc.appdirs import AppDirs
 
@@ -48,12 +49,15 @@ if platform.machine() in ("x86_64", "AMD64") and _config.CPU_FEATURES is None:
     # LLVM sums up in vectors of one width, so that a simulation is the same on each of these processors.
     features = f"{get_host_cpu_features()},+prefer-256-bit"
     _config.CPU_FEATURES = os.environ["NUMBA_CPU_FEATURES"] = features
+# Here, and not at the first kernel of each process that is forked.
+cpu_target.typing_context.refresh()
+cpu_target.target_context.refresh()
 _digests: dict[str, str] = {}  # of modules that hold kernels, by name
 _folders: dict[str, Path | None] = {}
 
 
-def njit(**options: Any) -> Callable[[Any], Any]:
-    """Return the decorator `numba.njit(**options)`, where cache=True means a cache that sees other files too.
+def njit(*, cache: bool = False, **options: Any) -> Callable[[Any], Any]:
+    """Return the decorator `numba.njit` with these options and, if asked, a cache that sees other files too.
 
     What a kernel takes from another file is to be imported above the first kernel of its own file. Where
     no folder can be written, every process compiles for itself.
@@ -61,7 +65,8 @@ def njit(**options: Any) -> Callable[[Any], Any]:
     Raises:
         ValueError: fastmath of other digits on another processor.
     """
-    fastmath = options.get("fastmath") or set()
+    # C calls no kernel: the wrapper for it is a seventh of the time to compile.
+    options["no_cfunc_wrapper"], fastmath = True, options.get("fastmath") or set()
     if fastmath is True or not ESTIMATING.isdisjoint(fastmath):
         raise ValueError(f"njit(fastmath={fastmath}): leave out {', '.join(sorted(ESTIMATING))}")
 
@@ -70,15 +75,12 @@ def njit(**options: Any) -> Callable[[Any], Any]:
         if module not in _digests:
             _digests[module] = _digest(function)
             _folders[module] = _folder(function, _digests[module])
-        folder = _folders[module] if options.get("cache") else None
+        folder = _folders[module] if cache else None
         # While it decorates: kernels of other packages keep their own.
         locators = _config.CACHE_LOCATOR_CLASSES
         _config.CACHE_LOCATOR_CLASSES = f"{__name__}.{KernelLocator.__name__}"
         try:
-            # no wrapper for callers in C, of which there are none: it is a seventh of the time to compile
-            kernel = numba.njit(**options | {"cache": folder is not None, "no_cfunc_wrapper": True})(
-                function
-            )
+            kernel = numba.njit(**options | {"cache": folder is not None})(function)
         finally:
             _config.CACHE_LOCATOR_CLASSES = locators
         if folder:
