@@ -56,8 +56,8 @@ _digests: dict[str, str] = {}  # of modules that hold kernels, by name
 _folders: dict[str, Path | None] = {}
 
 
-def njit(*, cache: bool = False, **options: Any) -> Callable[[Any], Any]:
-    """Return the decorator `numba.njit` with these options and, if asked, a cache that sees other files too.
+def njit(**options: Any) -> Callable[[Any], Any]:
+    """Return the decorator `numba.njit(**options)`, where cache=True means a cache that sees other files too.
 
     What a kernel takes from another file is to be imported above the first kernel of its own file. Where
     no folder can be written, every process compiles for itself.
@@ -65,8 +65,7 @@ def njit(*, cache: bool = False, **options: Any) -> Callable[[Any], Any]:
     Raises:
         ValueError: fastmath of other digits on another processor.
     """
-    # C calls no kernel: the wrapper for it is a seventh of the time to compile.
-    options["no_cfunc_wrapper"], fastmath = True, options.get("fastmath") or set()
+    fastmath = options.get("fastmath") or set()
     if fastmath is True or not ESTIMATING.isdisjoint(fastmath):
         raise ValueError(f"njit(fastmath={fastmath}): leave out {', '.join(sorted(ESTIMATING))}")
 
@@ -75,12 +74,14 @@ def njit(*, cache: bool = False, **options: Any) -> Callable[[Any], Any]:
         if module not in _digests:
             _digests[module] = _digest(function)
             _folders[module] = _folder(function, _digests[module])
-        folder = _folders[module] if cache else None
+        folder = _folders[module] if options.get("cache") else None
         # While it decorates: kernels of other packages keep their own.
         locators = _config.CACHE_LOCATOR_CLASSES
         _config.CACHE_LOCATOR_CLASSES = f"{__name__}.{KernelLocator.__name__}"
         try:
-            kernel = numba.njit(**options | {"cache": folder is not None})(function)
+            # C calls no kernel: the wrapper for it is a seventh of the time to compile.
+            forced = {"cache": folder is not None, "no_cfunc_wrapper": True}
+            kernel = numba.njit(**options | forced)(function)
         finally:
             _config.CACHE_LOCATOR_CLASSES = locators
         if folder:

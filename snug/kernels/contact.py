@@ -12,7 +12,7 @@ import igl
 import numpy as np
 
 from reference_sim.geometry.leaf_bounds import closest_on_triangle
-from reference_sim.kernels.fast_kernels import LANES
+from reference_sim.kernels.fast_kernels import GUARDED, LANES
 from reference_sim.kernels.kernel_cache import njit
 from reference_sim.kernels.lanes import add_lanes, copy_lanes, mix_rows
 
@@ -151,8 +151,7 @@ def _height(
     return n0 * (x0 - c0) + n1 * (x1 - c1) + n2 * (x2 - c2), n0, n1, n2
 
 
-# No assumption on NaN or infinity: the guard of training must see them.
-@njit(cache=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+@njit(cache=True, error_model="numpy", fastmath=GUARDED)
 def contact_energy(
     x: np.ndarray, stencils: np.ndarray, weights: np.ndarray, stiffness: np.ndarray, margin: np.float32,
     power: int, frames: np.ndarray, rows: np.ndarray, positions: np.ndarray, normals: np.ndarray,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import platform
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -87,6 +88,23 @@ def test_where_the_package_cannot_be_written_the_cache_of_the_user_serves(projec
     assert call(project, NUMBA_DISABLE_JIT="1", XDG_CACHE_HOME=user, HOME=user, LOCALAPPDATA=user)[
         2
     ].is_relative_to(user)
+
+
+SUM = (
+    "import numpy as np\nfrom reference_sim.minimise.descent import dot\n"
+    "a, b = np.random.default_rng(0).normal(size=(2, 3000))\nprint(dot(a, b).hex())"
+)
+
+
+@pytest.mark.skipif(platform.machine() not in ("x86_64", "AMD64"), reason="LLVM chooses the width there")
+def test_a_sum_has_the_same_digits_on_processors_that_prefer_other_vectors(tmp_path):
+    variables = {k: v for k, v in os.environ.items() if k != "NUMBA_CPU_FEATURES"}
+    variables |= {"PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(tmp_path)}
+    sums = [
+        subprocess.check_output([sys.executable, "-c", SUM], env=variables | {"NUMBA_CPU_NAME": name})
+        for name in ("skylake-avx512", "znver4")
+    ]
+    assert sums[0] == sums[1]
 
 
 @pytest.mark.parametrize("fastmath", [True, {"nsz", "arcp"}, {"afn"}])
