@@ -33,10 +33,14 @@ class Simulated:
         mixed: frames of augmented clips for each original frame, up to 20,000. The clips are the same for
             every training and seed, see snug.training.augmentation.make_shared_clips.
         method: name of the method that simulates.
+        clips_by: name of the method that simulates the augmented clips; empty: `method`.
+        turns: share of the default recipe's turns in the augmented clips.
     """
 
     mixed: int = 0
     method: str = "simulation"
+    clips_by: str = field(default="", metadata={"added": True})
+    turns: float = field(default=1.0, metadata={"added": True})
 
 
 @dataclass(frozen=True)
@@ -56,10 +60,13 @@ class Training:
     packaged: str = field(default="", metadata={"added": True})
 
     def at(self, preset: Preset) -> Training:
-        """Return the training with at most the augmented frames of a preset, and its turns."""
+        """Return the training with the augmented clips of a preset: how many, how turned, by which solver."""
         simulated, recipe = self.simulated, replace(self.recipe, turn=preset.turns * self.recipe.turn)
         if simulated:
-            simulated = replace(simulated, mixed=min(simulated.mixed, preset.simulated_mixed))
+            simulated = replace(
+                simulated, mixed=min(simulated.mixed, preset.simulated_mixed),
+                clips_by=preset.clips_by or simulated.clips_by, turns=preset.turns * simulated.turns,
+            )  # fmt: skip
         return replace(self, recipe=recipe, simulated=simulated)
 
 

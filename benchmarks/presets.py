@@ -31,7 +31,8 @@ class Preset:
     warm_up_frames: at the beginning of a dressed scene, simulated and not evaluated, before those of a
     clip; loop_frames: of the walk in a loop.
     steps: optimiser steps per kind of network, or per training. simulated_mixed: most augmented frames
-    that are simulated for each original one; turns: share of a recipe's turns in augmented frames.
+    that are simulated for each original one, by the method clips_by (empty: that of the training);
+    turns: share of a recipe's turns in augmented frames.
     settle_frames: frames from the T-pose into the first pose of a motion. sheet_cells: the small scenes
     are sheets of so many cells along each side, and have sheet_frames frames.
     gap_samples: frames of a trajectory, at least, at which part speed solves the step again to know the
@@ -61,6 +62,7 @@ class Preset:
     cell_seconds: float
     dependence: Dependence
     simulated_mixed: int = 1_000_000
+    clips_by: str = ""
     turns: float = 1.0
 
 

@@ -74,13 +74,14 @@ def simulate_clips(
     entry: MethodEntry,
     motions: tuple[str, ...],
     part: int,
+    turns: float,
     context: Context,
     outcomes: Needed,
 ) -> Outcome:
     """Write the vertices of clips whose simulation, settled as a motion's, is whole and converged.
 
     The clips are mixed from `motions`: those that `part` + 1 augmented frames for each original one have,
-    and `part` have not. The scene is that of any motion in the garment.
+    and `part` have not; `turns`: see make_shared_clips. The scene is that of any motion in the garment.
     """
     import numpy as np
 
@@ -92,22 +93,24 @@ def simulate_clips(
     left_out: dict[str, str] = {}
     sources = assets.pick(motions)
     vertices = len(assets.garments[scene.garment].rest_positions)
-    before, clips = (make_shared_clips(sources, share, vertices=vertices) for share in (part, part + 1))
+    before, clips = (
+        make_shared_clips(sources, share, turns=turns, vertices=vertices) for share in (part, part + 1)
+    )
     for clip in clips[len(before) :]:
         positions, reason = simulate_clip(clip, scene, entry, context)
         if reason:
             left_out[clip.name] = reason
         else:
             arrays[clip.name] = positions.astype(np.float32)  # as networks see it
-    path = run.curves_path(clips_of(scene.garment, motions), f"{entry.name}-{part}")
+    path = run.curves_path(clips_of(scene.garment, motions, turns), f"{entry.name}-{part}")
     with replacing(path) as temporary:
         np.savez(temporary, **arrays)
     return Outcome(result={"clips": list(arrays), "left_out": left_out}, files=(run.relative(path),))
 
 
-def clips_of(garment: str, motions: tuple[str, ...]) -> str:
-    """Return the name of the clips mixed from so many motions."""
-    return f"{garment}/mixed-{len(motions)}"
+def clips_of(garment: str, motions: tuple[str, ...], turns: float) -> str:
+    """Return the name of the clips mixed from so many motions, with that share of the turns."""
+    return f"{garment}/mixed-{len(motions)}-turns-{turns:g}"
 
 
 def simulate_clip(

@@ -142,6 +142,7 @@ def origin_of(job: NetworkTraining, outcomes: Needed, *, left_out: list[str]) ->
         "garment": job.network.garment,
         "motions": [name for name in job.motions if name not in left_out],
         "simulated_by": simulated.method if simulated else "",
+        "clips_by": simulated.clips_by or simulated.method if simulated else "",
         "left_out": left_out,
         "clips_left_out": sum(len(outcome.result.get("left_out", ())) for outcome in outcomes.values()),
         "data_seconds": sum(outcome.seconds for outcome in outcomes.values()),
@@ -167,7 +168,8 @@ def mix_clips(
     if twice := sorted(vertices_of.keys() & set(job.motions)):
         raise ValueError(f"training motion {twice[0]!r}: a mixed clip is called so: rename its file")
     vertices = len(assets.garments[job.network.garment].rest_positions)
-    clips = make_shared_clips(assets.pick(job.motions), len(parts), vertices=vertices)
+    turns = job.training.simulated.turns if job.training.simulated else 1.0
+    clips = make_shared_clips(assets.pick(job.motions), len(parts), turns=turns, vertices=vertices)
     return [clip for clip in clips if clip.name in vertices_of], vertices_of
 
 

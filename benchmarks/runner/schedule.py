@@ -157,16 +157,17 @@ class Schedule:
 
     def clips(self, garment: str, simulated: Simulated, motions: tuple[str, ...], part: int) -> Task:
         """Return the task that simulates a part of the augmented clips of motions."""
-        entry = find_method(simulated.method)
-        clips = clips_of(garment, motions)
+        entry, turns = find_method(simulated.clips_by or simulated.method), simulated.turns
+        clips = clips_of(garment, motions, turns)
         scene = find_garment(garment, self.plan.motions.garments).scene(motions[0]).at(self.preset)
         mixed_of = {name: self._motion(name) for name in motions}
         return Task(
             kind="clips", name=f"{flat(clips)}/{flat(entry.name)}-{part}",
             label=_label(f"{garment}, mixed clips of {len(motions)} motions, part {part}", entry),
-            stage="ground truth", silent=True, run=partial(simulate_clips, scene, entry, motions, part),
+            stage="ground truth", silent=True,
+            run=partial(simulate_clips, scene, entry, motions, part, turns),
             **self._list_scene(
-                scene, *code_behind(entry), method=read_entry(entry), part=part, motions=mixed_of
+                scene, *code_behind(entry), method=read_entry(entry), part=part, turns=turns, motions=mixed_of
             ),
         )  # fmt: skip
 

@@ -70,12 +70,16 @@ def augment(motions: Sequence[Motion], recipe: Recipe, *, vertices: int, seed: i
     return make_mixed_clips(motions, frames, turn=recipe.turn, lifted=LIFTED, seed=seed)
 
 
-def make_shared_clips(motions: Sequence[Motion], share: int, *, vertices: int) -> list[Motion]:
+def make_shared_clips(
+    motions: Sequence[Motion], share: int, *, turns: float, vertices: int
+) -> list[Motion]:
     """Return clips to simulate for the trainings of all seeds, mixed as the default recipe does.
 
     share: augmented frames for each original one. The clips of a smaller share are the first of a larger.
+    turns: share of that recipe's turns.
     """
-    return augment(motions, replace(DEFAULT, mixed=float(share)), vertices=vertices, seed=SHARED_SEED)
+    recipe = replace(DEFAULT, mixed=float(share), turn=turns * DEFAULT.turn)
+    return augment(motions, recipe, vertices=vertices, seed=SHARED_SEED)
 
 
 def make_mixed_clips(

@@ -43,7 +43,7 @@ MOTION = swaying(90)
 def clips_of(part: int, folder, assets, method: str = "simulation"):
     """Return the outcome of a part of the clips."""
     scene, entry = dressed_scene(MOTION.name), find_method(method)
-    return simulate_clips(scene, entry, (MOTION.name,), part, context(folder, assets), {})
+    return simulate_clips(scene, entry, (MOTION.name,), part, 1.0, context(folder, assets), {})
 
 
 def still(clip, entry) -> Trajectory:
@@ -89,7 +89,7 @@ def test_parts_are_all_clips_once_and_what_is_not_whole_is_left_out(tmp_path, qu
     odd |= {"mixed_0": ended, "mixed_2": refused, "mixed_3": halved}
     assets = assets_of(tube_dress(), MOTION)
     outcomes = [clips_of(part, tmp_path, assets) for part in range(4)]
-    assert asked == [clip.name for clip in make_shared_clips([MOTION], 4, vertices=150)]
+    assert asked == [clip.name for clip in make_shared_clips([MOTION], 4, turns=1.0, vertices=150)]
     assert [o.result["clips"] for o in outcomes] == [["mixed_1"], [], [], ["mixed_4", "mixed_5"]]
     left_out = {name: why for o in outcomes for name, why in o.result["left_out"].items()}
     assert left_out == {"mixed_0": "stalled: stuck", "mixed_2": "no room", "mixed_3": "converged: "}
@@ -116,7 +116,8 @@ def test_a_network_learns_from_given_motions_and_from_the_clips_that_are_there(t
 
 def test_sizes_limit_what_is_simulated_and_turned():
     small, quick = find_preset("small"), find_preset("quick")
-    assert TRAININGS["supervised"].at(small).simulated.mixed == small.simulated_mixed == 0
+    simulated = TRAININGS["supervised"].at(small).simulated
+    assert simulated == Simulated(mixed=2, clips_by="fast-lbfgs-10", turns=small.turns)
     assert TRAININGS["snug"].at(small).recipe.turn == small.turns * 0.2 == 0.1
     assert all(training.at(quick) == training for training in TRAININGS.values())
 
@@ -138,7 +139,11 @@ def test_the_same_simulations_serve_every_seed_and_training(tmp_path, monkeypatc
     assert len(labels) == len(set(labels)) == len({task.id for task in tasks}) == 1 + 2 + 3 + 2 + 2
     assert "tshirt/walk" in labels and "tshirt/walk by fast-lbfgs-10" in labels
     *_, first, second = Schedule(plan).training(Network("tailornet", 0, "tshirt")).reads
-    assert [first, second] == [("clips", f"tshirt-mixed-2/fast-lbfgs-10-{part}") for part in (0, 1)]
+    assert [first, second] == [
+        ("clips", f"tshirt-mixed-2-turns-1/fast-lbfgs-10-{part}") for part in (0, 1)
+    ]
+    clips = Schedule(plan).clips("tshirt", Simulated(clips_by="newton-4", turns=0.5), ("walk",), 0)
+    assert clips.id == ("clips", "tshirt-mixed-1-turns-0.5/newton-4-0") and "turns" in clips.inputs
 
 
 @pytest.mark.slow
