@@ -61,24 +61,34 @@ class FastSkin(torch.autograd.Function):
         if columns.shape[2] % LANES:
             columns = nn.functional.pad(columns, (0, -columns.shape[2] % LANES))
         posed = np.empty((len(entries), len(weights), 3, LANES), np.float32)
-        _pose(columns.contiguous().numpy().ravel(), *ctx.moving, posed.ravel())
+        _pose(columns.contiguous().numpy().ravel(), *ctx.moving, posed.ravel(), False)
         return from_lanes(posed, *points.shape[:2])
 
     @staticmethod
     def backward(ctx: Any, *above: Tensor) -> tuple[Tensor, None, None]:
-        """Return the gradient by the points."""
+        """Return the gradient by the points: the transpose of each rotation turns that from above."""
         windows, frames, vertices, _ = above[0].shape
         weights, entries = ctx.moving
+        turned_back = np.zeros_like(entries)
+        source, target = (
+            a.reshape(*a.shape[:2], 3, 4, LANES)[..., :3, :] for a in (entries, turned_back)
+        )
+        target[:] = source.swapaxes(2, 3)
         back = np.empty((vertices, 3, len(entries), LANES), np.float32)
-        _turn_back(to_lanes(above[0]).ravel(), weights, entries, back.ravel())
+        _pose(to_lanes(above[0]).ravel(), weights, turned_back, back.ravel(), True)
         columns = torch.from_numpy(back).flatten(2)[..., : frames * windows]
         return columns.unflatten(2, (frames, windows)).permute(3, 2, 0, 1), None, None
 
 
 # Each point is copied into a small array of known size: the compiler then knows that nothing overlaps.
 @njit(cache=True, fastmath={"contract"}, error_model="numpy")
-def _pose(points: np.ndarray, weights: np.ndarray, entries: np.ndarray, out: np.ndarray) -> None:
-    """Pose flat points (V, 3, C, L) by weights (V, J), entries (C, J, 12 L) into flat out (C, V, 3, L)."""
+def _pose(
+    points: np.ndarray, weights: np.ndarray, entries: np.ndarray, out: np.ndarray, by_block: bool
+) -> None:
+    """Pose flat points (V, 3, C, L) by weights (V, J), entries (C, J, 12 L) into flat out (C, V, 3, L).
+
+    by_block: the other way round, from points (C, V, 3, L) into out (V, 3, C, L).
+    """
     L, (vertices, joints), blocks = LANES, weights.shape, len(entries)
     u = np.empty(6 * L, np.float32)
     moving = np.empty(joints, np.int64)
@@ -86,7 +96,8 @@ def _pose(points: np.ndarray, weights: np.ndarray, entries: np.ndarray, out: np.
         count = _list_joints(weights[v], moving)
         for block in range(blocks):
             for axis in range(3):
-                copy_lanes(points, (3 * v + axis) * blocks + block, u, axis)
+                by_vertex, blockwise = (3 * v + axis) * blocks + block, 3 * (vertices * block + v) + axis
+                copy_lanes(points, blockwise if by_block else by_vertex, u, axis)
             u[3 * L :] = np.float32(0.0)
             for m in range(count):
                 w, b = weights[v, moving[m]], entries[block, moving[m]]
@@ -100,30 +111,8 @@ def _pose(points: np.ndarray, weights: np.ndarray, entries: np.ndarray, out: np.
                         b[8 * L + n] * x + b[9 * L + n] * y + b[10 * L + n] * z + b[11 * L + n]
                     )
             for axis in range(3):
-                copy_lanes(u, 3 + axis, out, 3 * (vertices * block + v) + axis)
-
-
-@njit(cache=True, fastmath={"contract"}, error_model="numpy")
-def _turn_back(above: np.ndarray, weights: np.ndarray, entries: np.ndarray, out: np.ndarray) -> None:
-    """Compute the gradients by the points, laid out like these: the transpose of each rotation part."""
-    L, (vertices, joints), blocks = LANES, weights.shape, len(entries)
-    u = np.empty(6 * L, np.float32)
-    moving = np.empty(joints, np.int64)
-    for v in range(vertices):
-        count = _list_joints(weights[v], moving)
-        for block in range(blocks):
-            for axis in range(3):
-                copy_lanes(above, 3 * (vertices * block + v) + axis, u, axis)
-            u[3 * L :] = np.float32(0.0)
-            for m in range(count):
-                w, b = weights[v, moving[m]], entries[block, moving[m]]
-                for n in range(L):
-                    x, y, z = u[n], u[L + n], u[2 * L + n]
-                    u[3 * L + n] += w * (b[n] * x + b[4 * L + n] * y + b[8 * L + n] * z)
-                    u[4 * L + n] += w * (b[L + n] * x + b[5 * L + n] * y + b[9 * L + n] * z)
-                    u[5 * L + n] += w * (b[2 * L + n] * x + b[6 * L + n] * y + b[10 * L + n] * z)
-            for axis in range(3):
-                copy_lanes(u, 3 + axis, out, (3 * v + axis) * blocks + block)
+                by_vertex, blockwise = (3 * v + axis) * blocks + block, 3 * (vertices * block + v) + axis
+                copy_lanes(u, 3 + axis, out, by_vertex if by_block else blockwise)
 
 
 @njit(cache=True, error_model="numpy")
