@@ -35,10 +35,10 @@ _Q1, _Q2, _Q3, _Q4 = (
     np.float32(value) for value in (0.4671431632, 0.02587686905, 0.0003285585030, 7.776264194e-07)
 )
 
-_LINEAR = (
-    getattr(torch.ops.mkldnn, "_linear_pointwise", None) if torch.backends.mkldnn.is_available() else None
-)
-_MKL_IS_SLOW = get_host_cpu_name().startswith("znver")  # AMD's, where it makes no use of AVX-512
+# Without AVX-512 oneDNN is the slower one; MKL makes no use of it on AMD's processors.
+_ONEDNN = torch.backends.mkldnn.is_available() and torch.backends.cpu.get_cpu_capability() != "AVX2"
+_LINEAR = getattr(torch.ops.mkldnn, "_linear_pointwise", None) if _ONEDNN else None
+_MKL_IS_SLOW = get_host_cpu_name().startswith("znver")
 
 
 def product(a: Tensor, b: Tensor, bias: Tensor | None = None) -> Tensor:

@@ -93,7 +93,11 @@ def _pose(
     u = np.empty(6 * L, np.float32)
     moving = np.empty(joints, np.int64)
     for v in range(vertices):
-        count = _list_joints(weights[v], moving)
+        count = 0
+        for joint in range(joints):
+            if weights[v, joint] != np.float32(0.0):
+                moving[count] = joint
+                count += 1
         for block in range(blocks):
             for axis in range(3):
                 by_vertex, blockwise = (3 * v + axis) * blocks + block, 3 * (vertices * block + v) + axis
@@ -113,14 +117,3 @@ def _pose(
             for axis in range(3):
                 by_vertex, blockwise = (3 * v + axis) * blocks + block, 3 * (vertices * block + v) + axis
                 copy_lanes(u, 3 + axis, out, by_vertex if by_block else blockwise)
-
-
-@njit(cache=True, error_model="numpy")
-def _list_joints(weights: np.ndarray, moving: np.ndarray) -> int:
-    """Write the joints that move a vertex of weights (J,) into moving (J,); return their number."""
-    count = 0
-    for joint in range(len(weights)):
-        if weights[joint] != np.float32(0.0):
-            moving[count] = joint
-            count += 1
-    return count
