@@ -109,7 +109,8 @@ def _pick_worst(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 GROUP = ["place", "method", "metric"]
-NOT_OF_SCENES = ("name", "description", "steps")  # values of a preset that change no scene
+# Values of a preset that change no scene.
+NOT_OF_SCENES = ("name", "description", "steps", "simulated_mixed", "clips_by", "turns")
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ DIGESTS = {
     "motions": "a3c9146af5c55bb4",
     "metrics": "8d678e8419e78ad3",
     "reference": "143d7369e2970032",
-    "sampling": "0d55729f6f0105e3",
+    "sampling": "9e5f35a896b154e9",
     "statistics": "bbdacc941ceaa26a",
 }
 DIGEST = digest(DIGESTS)

@@ -29,6 +29,7 @@ from benchmarks.scenes import GARMENT_SCENES, SCENES, all_scenes, dressed_body
 from reference_sim import material
 from reference_sim.energies.contact_penalty import DEFAULT_MARGIN, DEFAULT_STIFFNESS
 from reference_sim.minimise.newton import Newton
+from reports.comparison import NOT_OF_SCENES
 from snug.body.parametric_body import Body
 from snug.garments.templates import find_template
 from snug.motion import library
@@ -120,7 +121,7 @@ def _metrics() -> dict[str, Any]:
 
 def _sampling() -> dict[str, Any]:
     return {
-        "presets": {preset.name: asdict(replace(preset, description="", steps={})) for preset in PRESETS},
+        "presets": {p.name: {n: v for n, v in asdict(p).items() if n not in NOT_OF_SCENES} for p in PRESETS},
         "gap": (energy_gap.PRECISION, energy_gap.NEGLIGIBLE, energy_gap.ITERATIONS),
         "hem": (
             dynamics.SHIFTING, dynamics.MAX_LAG, dynamics.SHORTEST, dynamics.NO_MOTION,
