@@ -32,14 +32,14 @@ class Simulated:
     Attributes:
         mixed: frames of augmented clips for each original frame, up to 20,000. The clips are the same for
             every training and seed, see snug.training.augmentation.make_shared_clips.
-        method: name of the method that simulates the training motions.
-        clips_by: name of the method that simulates the augmented clips.
+        method: name of the method that simulates.
+        clips_by: name of the method that simulates the augmented clips; empty: `method`.
         turns: share of the default recipe's turns in the augmented clips.
     """
 
     mixed: int = 0
     method: str = "simulation"
-    clips_by: str = field(default="simulation", metadata={"added": True})
+    clips_by: str = field(default="", metadata={"added": True})
     turns: float = field(default=1.0, metadata={"added": True})
 
 

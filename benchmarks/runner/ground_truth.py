@@ -92,8 +92,10 @@ def simulate_clips(
     arrays: dict[str, Any] = {}
     left_out: dict[str, str] = {}
     sources = assets.pick(motions)
-    mixed: Any = {"turns": turns, "vertices": len(assets.garments[scene.garment].rest_positions)}
-    before, clips = (make_shared_clips(sources, share, **mixed) for share in (part, part + 1))
+    vertices = len(assets.garments[scene.garment].rest_positions)
+    before, clips = (
+        make_shared_clips(sources, share, turns=turns, vertices=vertices) for share in (part, part + 1)
+    )
     for clip in clips[len(before) :]:
         positions, reason = simulate_clip(clip, scene, entry, context)
         if reason:

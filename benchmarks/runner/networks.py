@@ -142,7 +142,7 @@ def origin_of(job: NetworkTraining, outcomes: Needed, *, left_out: list[str]) ->
         "garment": job.network.garment,
         "motions": [name for name in job.motions if name not in left_out],
         "simulated_by": simulated.method if simulated else "",
-        "clips_by": simulated.clips_by if simulated else "",
+        "clips_by": simulated.clips_by or simulated.method if simulated else "",
         "left_out": left_out,
         "clips_left_out": sum(len(outcome.result.get("left_out", ())) for outcome in outcomes.values()),
         "data_seconds": sum(outcome.seconds for outcome in outcomes.values()),

@@ -157,7 +157,7 @@ class Schedule:
 
     def clips(self, garment: str, simulated: Simulated, motions: tuple[str, ...], part: int) -> Task:
         """Return the task that simulates a part of the augmented clips of motions."""
-        entry, turns = find_method(simulated.clips_by), simulated.turns
+        entry, turns = find_method(simulated.clips_by or simulated.method), simulated.turns
         clips = clips_of(garment, motions, turns)
         scene = find_garment(garment, self.plan.motions.garments).scene(motions[0]).at(self.preset)
         mixed_of = {name: self._motion(name) for name in motions}

@@ -40,7 +40,7 @@ METHODS = tuple(
         name_of(weight), f"Supervised, lambda {weight:g} cm²/J", f"supervised, lambda {weight:g} cm^2/J",
         training=Training(
             "supervised", replace(SUPERVISED, name=name_of(weight), physics_weight=weight),
-            Simulated(mixed=1, method=SOLVER, clips_by=SOLVER),
+            Simulated(mixed=1, method=SOLVER),
         ),
         role="ablation", timed=False, batched=False,
     )

@@ -99,9 +99,11 @@ def _pose(
                 moving[count] = joint
                 count += 1
         for block in range(blocks):
+            # Place of the first axis, and what lies between two axes.
+            vertexwise, blockwise = (3 * v * blocks + block, blocks), (3 * (vertices * block + v), 1)
+            source, target = (blockwise, vertexwise) if by_block else (vertexwise, blockwise)
             for axis in range(3):
-                by_vertex, blockwise = (3 * v + axis) * blocks + block, 3 * (vertices * block + v) + axis
-                copy_lanes(points, blockwise if by_block else by_vertex, u, axis)
+                copy_lanes(points, source[0] + source[1] * axis, u, axis)
             u[3 * L :] = np.float32(0.0)
             for m in range(count):
                 w, b = weights[v, moving[m]], entries[block, moving[m]]
@@ -115,5 +117,4 @@ def _pose(
                         b[8 * L + n] * x + b[9 * L + n] * y + b[10 * L + n] * z + b[11 * L + n]
                     )
             for axis in range(3):
-                by_vertex, blockwise = (3 * v + axis) * blocks + block, 3 * (vertices * block + v) + axis
-                copy_lanes(u, 3 + axis, out, by_vertex if by_block else blockwise)
+                copy_lanes(u, 3 + axis, out, target[0] + target[1] * axis)

@@ -190,7 +190,8 @@ def test_runs_of_other_scenes_are_refused_by_name(before, after, says):
 
 
 def test_steps_of_training_and_values_of_a_later_version_make_no_other_scenes():
-    one, other = ({"frames": 20, "turns": 1.0}, {"frames": 20, "turns": 0.5, "steps": {}, "new": 1})
+    one = {"frames": 20, "steps": {"snug": 1}, "turns": 1.0}
+    other = {"frames": 20, "steps": {"snug": 2}, "turns": 0.5, "new": 1}
     assert compare(run_of(a_run(), preset_values=one), run_of(a_run(), preset_values=other)).changes == ()
 
 

@@ -116,14 +116,16 @@ def test_a_network_learns_from_given_motions_and_from_the_clips_that_are_there(t
 
 def test_sizes_limit_what_is_simulated_and_turned():
     small, quick = find_preset("small"), find_preset("quick")
-    assert TRAININGS["supervised"].at(small).simulated == Simulated(2, "simulation", "fast-lbfgs-10", 0.5)
+    simulated = TRAININGS["supervised"].at(small).simulated
+    assert simulated.mixed == small.simulated_mixed == 2
+    assert (simulated.method, simulated.clips_by, simulated.turns) == ("simulation", "fast-lbfgs-10", 0.5)
     assert TRAININGS["snug"].at(small).recipe.turn == small.turns * 0.2 == 0.1
     assert all(training.at(quick) == training for training in TRAININGS.values())
 
 
 def test_the_same_simulations_serve_every_seed_and_training(tmp_path, monkeypatch):
     rough = "fast-lbfgs-10"
-    for name, simulated in (("tailornet", Simulated(2, rough, rough)), ("supervised", Simulated(3))):
+    for name, simulated in (("tailornet", Simulated(2, rough)), ("supervised", Simulated(3))):
         training = dataclasses.replace(TRAININGS[name], simulated=simulated)
         monkeypatch.setitem(TRAININGS, name, training)
     scene, names = dressed_scene("kick"), ("supervised", "santesteban2019", "tailornet", "snug")
@@ -136,7 +138,7 @@ def test_the_same_simulations_serve_every_seed_and_training(tmp_path, monkeypatc
     assert len(labels) == len(set(labels)) == len({task.id for task in tasks}) == 1 + 2 + 3 + 2 + 2
     assert "tshirt/walk" in labels and "tshirt/walk by fast-lbfgs-10" in labels
     *_, first, second = Schedule(plan).training(Network("tailornet", 0, "tshirt")).reads
-    assert [first[1], second[1]] == [f"tshirt-mixed-2-turns-1/{rough}-{part}" for part in (0, 1)]
+    assert [first, second] == [("clips", f"tshirt-mixed-2-turns-1/{rough}-{part}") for part in (0, 1)]
     clips = Schedule(plan).clips("tshirt", Simulated(clips_by="newton-4", turns=0.5), ("walk",), 0)
     assert clips.id == ("clips", "tshirt-mixed-1-turns-0.5/newton-4-0") and "turns" in clips.inputs
 
